@@ -1,0 +1,2 @@
+//! The `canopy` program.
+fn main() {}

@@ -1,0 +1,166 @@
+//! What the user describes: a terrain, species, a sun, a sky, cameras. Everything here is validated:
+//! whoever holds a [`Scene`] holds finite numbers, existing textures and sane sizes.
+//!
+//! World axes: x east, y north, z up, metres, relative to the south-west corner of the terrain.
+
+pub mod mesh;
+
+use std::sync::Arc;
+
+use crate::settings::Settings;
+pub use mesh::{Material, Mesh, Texture};
+
+/// A whole scene, ready to plan and render.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Name, for titles and file names.
+    pub name: String,
+    /// Seed of everything random.
+    pub seed: u32,
+    /// The ground.
+    pub terrain: Terrain,
+    /// The trees.
+    pub species: Vec<Species>,
+    /// The sun.
+    pub sun: Sun,
+    /// The sky.
+    pub sky: Sky,
+    /// At least one camera; the first is the default.
+    pub cameras: Vec<Camera>,
+    /// Preset and knobs.
+    pub settings: Settings,
+}
+
+/// A raster of 32-bit floats; row 0 is **south**, so that row and y grow together.
+#[derive(Clone, Debug)]
+pub struct Raster {
+    /// Samples west to east.
+    pub width: u32,
+    /// Samples south to north.
+    pub height: u32,
+    /// `width * height` samples, row by row from the south-west corner.
+    pub samples: Vec<f32>,
+}
+
+/// The ground.
+#[derive(Clone, Debug)]
+pub struct Terrain {
+    /// Coordinates of the south-west corner in the scene file's system (subtracted from everything on loading), m.
+    pub origin: [f64; 2],
+    /// Extent east and north, m.
+    pub extent: [f64; 2],
+    /// Metres between samples of `heights`.
+    pub cell_size: f64,
+    /// Heights, m; `None` for a level plain at z = 0.
+    pub heights: Option<Raster>,
+    /// Lambertian reflectance.
+    pub albedo: Albedo,
+}
+
+/// Ground reflectance.
+#[derive(Clone, Debug)]
+pub enum Albedo {
+    /// The same everywhere, linear RGB.
+    Uniform([f32; 3]),
+    /// An image over the whole terrain, sRGB; row 0 is **north** as in the file.
+    Image(Arc<Texture>),
+}
+
+/// One species of tree.
+#[derive(Clone, Debug)]
+pub struct Species {
+    /// Name, unique in the scene.
+    pub name: String,
+    /// The model of an unscaled tree, z up, trunk base at the origin, already scaled to the species' `height`.
+    pub mesh: Arc<Mesh>,
+    /// Range of the random scale.
+    pub scale: [f32; 2],
+    /// Where trees stand.
+    pub distribution: Distribution,
+    /// Optical overrides; `None` is measured from the mesh.
+    pub optics: OpticsOverride,
+}
+
+/// Optical properties that the scene states instead of the model.
+#[derive(Clone, Debug, Default)]
+pub struct OpticsOverride {
+    /// Leaf reflectance, RGB.
+    pub leaf_reflectance: Option<[f32; 3]>,
+    /// Leaf transmittance, RGB.
+    pub leaf_transmittance: Option<[f32; 3]>,
+    /// Bark reflectance, RGB.
+    pub bark_reflectance: Option<[f32; 3]>,
+    /// Extinction coefficient of the crown, 1/m.
+    pub extinction: Option<f32>,
+}
+
+/// Where the trees of a species stand.
+#[derive(Clone, Debug)]
+pub enum Distribution {
+    /// A density, in trees per m² of horizontal ground, thinned from the point pattern.
+    Density {
+        /// Relative density in [0, 1] over the whole terrain; `None` is 1 everywhere.
+        map: Option<Arc<Raster>>,
+        /// Density where the map is 1, trees per m².
+        max_density: f32,
+        /// Smooth limits of height, m.
+        between_heights: Option<[f32; 2]>,
+        /// Smooth upper limit of slope, degrees.
+        below_slope: Option<f32>,
+    },
+    /// A list of trees.
+    Positions(Arc<Vec<TreePosition>>),
+}
+
+/// One listed tree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TreePosition {
+    /// East, m from the south-west corner.
+    pub x: f64,
+    /// North, m from the south-west corner.
+    pub y: f64,
+    /// Scale; `None` draws it from the species' range.
+    pub scale: Option<f32>,
+    /// Rotation about the vertical, degrees; `None` draws it.
+    pub rotation: Option<f32>,
+}
+
+/// The sun.
+#[derive(Clone, Copy, Debug)]
+pub struct Sun {
+    /// Degrees clockwise from north.
+    pub azimuth: f64,
+    /// Degrees above the horizon; may be negative.
+    pub elevation: f64,
+    /// RGB irradiance on a plane facing the sun.
+    pub irradiance: [f32; 3],
+}
+
+/// The sky.
+#[derive(Clone, Debug)]
+pub enum Sky {
+    /// The same radiance everywhere, RGB.
+    Uniform([f32; 3]),
+    /// A latitude-longitude image, linear RGB: `width * height * 3` floats, row 0 at the zenith, column 0 at north, turning east.
+    LatLong {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Linear RGB radiance.
+        pixels: Arc<Vec<f32>>,
+    },
+}
+
+/// A camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Name, unique in the scene.
+    pub name: String,
+    /// x, y from the south-west corner, z above the ground there, m.
+    pub position: [f64; 3],
+    /// What it looks at, in the same coordinates.
+    pub target: [f64; 3],
+    /// Vertical field of view, degrees.
+    pub vertical_fov: f64,
+}

@@ -1,0 +1,162 @@
+//! Every knob: unit, range, meaning and cost, in one place. Presets are points in this space.
+
+use crate::{Error, Result};
+
+/// What a knob is.
+#[derive(Clone, Copy, Debug)]
+pub struct Knob {
+    /// Name as written in scene files and after `--set`.
+    pub name: &'static str,
+    /// Unit, or empty.
+    pub unit: &'static str,
+    /// Smallest value.
+    pub min: f64,
+    /// Largest value.
+    pub max: f64,
+    /// Only whole numbers.
+    pub whole: bool,
+    /// Values at presets fast, balanced, accurate.
+    pub presets: [f64; 3],
+    /// Meaning and cost.
+    pub help: &'static str,
+}
+
+/// Names of the presets, in the order of [`Knob::presets`].
+pub const PRESETS: [&str; 3] = ["fast", "balanced", "accurate"];
+
+macro_rules! knobs {
+    ($($field:ident: $ty:tt, $unit:literal, $min:literal..=$max:literal, [$f:literal, $b:literal, $a:literal], $help:literal;)*) => {
+        /// The value of every knob.
+        #[derive(Clone, Debug, PartialEq, serde::Serialize)]
+        pub struct Settings { $(#[doc = $help] pub $field: $ty,)* }
+
+        /// Every knob, in the order of printing.
+        pub const KNOBS: &[Knob] = &[$(Knob {
+            name: stringify!($field), unit: $unit, min: $min as f64, max: $max as f64,
+            whole: knobs!(@whole $ty), presets: [$f as f64, $b as f64, $a as f64], help: $help,
+        },)*];
+
+        impl Settings {
+            fn write(&mut self, name: &str, value: f64) {
+                match name { $(stringify!($field) => self.$field = value as $ty,)* _ => unreachable!("checked by the caller") }
+            }
+
+            /// The value of a knob by name.
+            pub fn get(&self, name: &str) -> Option<f64> {
+                match name { $(stringify!($field) => Some(self.$field as f64),)* _ => None }
+            }
+
+            /// All knobs at a preset's values.
+            fn at(index: usize) -> Self {
+                Settings { $($field: [$f as f64, $b as f64, $a as f64][index] as $ty,)* }
+            }
+        }
+    };
+    (@whole u32) => { true };
+    (@whole f32) => { false };
+}
+
+knobs! {
+    view_rings: u32, "", 1..=16, [6, 9, 9], "rings n of z-field views: 2n(n+1)+1 views over the hemisphere (9: 181); memory and bake time grow with the square";
+    view_resolution: u32, "texels", 16..=512, [128, 256, 256], "texels a side of a z-field view (a power of two); memory and bake time grow with the square";
+    view_iterations: u32, "", 1..=4, [1, 2, 3], "fixed-point iterations for the view ray; each costs three texel fetches a fragment";
+    light_iterations: u32, "", 0..=2, [1, 1, 2], "iterations for the light ray; 0 leaves out self-shadow and silver lining";
+    occlusion_rays: u32, "", 8..=1024, [32, 64, 128], "rays a cell for baked ambient occlusion; bake time";
+    samples: u32, "", 1..=8, [4, 4, 8], "samples a pixel (1, 4 or 8, as far as the device goes): levels of opacity; fill cost";
+    zfield_min_pixels: f32, "px", 0.25..=64.0, [4.0, 3.0, 2.0], "apparent tree height under which trees are no longer drawn one by one; cost grows with its inverse square";
+    zfield_max_trees: u32, "", 1..=16000000, [1000000, 2000000, 4000000], "most trees drawn one by one; bounds memory";
+    cascades: u32, "", 1..=4, [3, 4, 4], "shadow cascades; each draws the trees of its slice again";
+    cascade_size: u32, "texels", 64..=8192, [1024, 2048, 4096], "texels a side of a cascade; fill cost";
+    cascade_split: f32, "", 0.0..=1.0, [0.8, 0.8, 0.8], "0 uniform, 1 logarithmic cascade ranges (parallel-split)";
+    shadow_distance: f32, "m", 0.0..=1000000.0, [0.0, 0.0, 0.0], "range of the cascades; 0 is as far as trees are drawn one by one";
+    coverage_size: u32, "texels", 32..=1024, [128, 256, 512], "texels a side of the coverage tile of a seed quad";
+    terrain_pixels: f32, "px", 1.0..=64.0, [12.0, 8.0, 4.0], "size of a terrain mesh cell on the screen; vertices grow with the inverse square";
+    hotspot_amplitude: f32, "", 0.0..=1.0, [0.2, 0.2, 0.2], "a1 of the leaf-scale hotspot (BN12, eq. 8)";
+    hotspot_width: f32, "1/rad", 0.0..=1000.0, [20.0, 20.0, 20.0], "a2 of the leaf-scale hotspot (BN12, eq. 8)";
+    ground_contrast: f32, "", 0.0..=4.0, [1.0, 1.0, 1.0], "a3: how much darker the ground is under trees than between them (BN12, eq. 10)";
+    hole_radius: f32, "", 0.1..=10.0, [2.0, 2.0, 2.0], "radius of the hole around a tree times the square root of the density (BN12, eq. 9: 2; Poisson points: 0.5)";
+    memory_mib: u32, "MiB", 16..=1048576, [2048, 2048, 4096], "most device memory a plan may take";
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings::at(1)
+    }
+}
+
+impl Settings {
+    /// All knobs at a preset's values; `None` if there is no such preset.
+    pub fn preset(name: &str) -> Option<Self> {
+        PRESETS.iter().position(|p| *p == name).map(Settings::at)
+    }
+
+    /// Sets a knob by name. Errors say what is allowed and name the nearest knob.
+    pub fn set(&mut self, name: &str, value: f64) -> Result<()> {
+        let Some(knob) = KNOBS.iter().find(|k| k.name == name) else {
+            let hint = nearest(name, KNOBS.iter().map(|k| k.name))
+                .map_or(String::new(), |n| format!("; the nearest is \"{n}\""));
+            return Err(Error::Usage(format!("no knob \"{name}\"{hint}")));
+        };
+        let whole = !knob.whole || value.fract() == 0.0;
+        let power = !matches!(name, "view_resolution" | "coverage_size" | "cascade_size")
+            || (value as u64).is_power_of_two();
+        let samples = name != "samples" || matches!(value as u32, 1 | 4 | 8);
+        if !value.is_finite() || value < knob.min || value > knob.max || !whole || !power || !samples {
+            let kind = match name {
+                "samples" => "1, 4 or 8, ",
+                _ if !power || name.ends_with("_size") || name == "view_resolution" => "a power of two, ",
+                _ if knob.whole => "a whole number, ",
+                _ => "",
+            };
+            return Err(Error::Usage(format!(
+                "knob \"{name}\" is {value}; it takes {kind}{} to {} {}",
+                knob.min, knob.max, knob.unit
+            )));
+        }
+        self.write(name, value);
+        Ok(())
+    }
+}
+
+/// The candidate with the smallest edit distance to `name`, if it is near enough to be meant.
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    candidates
+        .into_iter()
+        .map(|c| (strsim::damerau_levenshtein(name, c), c))
+        .min()
+        .filter(|(d, c)| *d <= c.len().div_ceil(2))
+        .map(|(_, c)| c)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_are_in_range() {
+        for (i, preset) in PRESETS.iter().enumerate() {
+            let mut s = Settings::preset(preset).unwrap();
+            for k in KNOBS {
+                s.set(k.name, k.presets[i]).unwrap();
+                assert_eq!(s.get(k.name), Some(k.presets[i] as f32 as f64).filter(|_| true), "{}", k.name);
+            }
+        }
+    }
+
+    #[test]
+    fn wrong_knobs_are_refused_with_a_hint() {
+        let mut s = Settings::default();
+        let e = s.set("cascade", 4.0).unwrap_err().to_string();
+        assert!(e.contains("\"cascades\""), "{e}");
+        for (name, value) in [
+            ("samples", 3.0),
+            ("cascades", 2.5),
+            ("cascade_size", 1000.0),
+            ("terrain_pixels", f64::NAN),
+            ("view_rings", 0.0),
+        ] {
+            assert!(s.set(name, value).is_err(), "{name} = {value}");
+        }
+        assert_eq!(s, Settings::default());
+    }
+}

@@ -1,0 +1,1 @@
+//! Procedural species, written as glTF and read back as glTF.
