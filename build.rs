@@ -134,7 +134,9 @@ fn shader(compiler: &shaderc::Compiler, name: &str, path: &Path, root: &Path, ou
             ReflectDescriptorType::StorageImage => "STORAGE_IMAGE",
             other => return Err(format!("{name}: binding {} has an unused kind {other:?}", b.name).into()),
         };
-        // Blocks are bound by their instance name; SPIRV-Reflect gives the type's name where there is none.
+        if b.name.is_empty() {
+            return Err(format!("{name}: binding {} needs an instance name: callers bind by it", b.binding).into());
+        }
         bindings.push((b.binding, b.name.clone(), kind));
     }
     bindings.sort();
@@ -200,7 +202,8 @@ fn structs(compiler: &shaderc::Compiler, text: &str, root: &Path) -> Fallible<St
     for (k, (name, doc)) in names.iter().enumerate() {
         let block = blocks.iter().find(|b| b.binding == k as u32).ok_or("a struct got lost")?;
         let items = block.block.members.first().ok_or("a struct is empty")?;
-        let stride = items.type_description.as_ref().map_or(0, |t| t.traits.array.stride);
+        let described = items.type_description.as_ref().map_or(0, |t| t.traits.array.stride);
+        let stride = described.max(items.array.stride).max(items.padded_size);
         emit(&mut rust, name, doc, items, stride, text)?;
     }
     Ok(rust)

@@ -3,6 +3,7 @@
 
 pub mod bake;
 pub mod error;
+pub mod gpu;
 pub mod physics;
 pub mod progress;
 pub mod scene;

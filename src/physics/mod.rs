@@ -1,1 +1,8 @@
-//! f64 models of the papers, without Vulkan: the oracle for the shaders of the same name.
+//! f64 models of the papers, without Vulkan: the oracle for the shaders of the same name in `shaders/physics/`.
+
+pub mod hash;
+pub mod light;
+pub mod masks;
+pub mod shadow;
+pub mod terrain;
+pub mod tonemap;

@@ -1,0 +1,29 @@
+// Totals of the lists become draw commands: the camera's trees (bins one after the other), then each cascade's casters.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "interface.glsl"
+
+layout(local_size_x = 1) in;
+layout(std430, binding = 0) readonly buffer Totals { uint items[]; } totals;
+layout(std430, binding = 1) writeonly buffer Commands { DrawCommand items[]; } commands;
+layout(std430, binding = 2) writeonly buffer Starts { uint items[]; } starts;
+layout(push_constant) uniform Push { CullParameters p; };
+
+void main() {
+    // All trees that someone sees; then the camera's list, bin after bin; then the cascades' lists, each of its own.
+    starts.items[0] = 0u;
+    uint at = 0u;
+    for (uint bin = 0u; bin < DISTANCE_BINS; bin++) {
+        starts.items[1u + bin] = at;
+        at += totals.items[1u + bin];
+    }
+    // Beyond the capacity nothing was written: the host reads the totals and refuses such a frame.
+    bool fits = totals.items[0] <= p.tree_capacity;
+    commands.items[0] = DrawCommand(fits ? 6u * at : 0u, 1u, 0u, 0, 0u);
+    for (uint c = 0u; c < MAX_CASCADES; c++) {
+        uint list = 1u + DISTANCE_BINS + c;
+        starts.items[list] = (1u + c) * p.tree_capacity;
+        commands.items[1u + c] =
+            DrawCommand(fits ? 6u * totals.items[list] : 0u, 1u, 0u, int(4u * (1u + c) * p.tree_capacity), 0u);
+    }
+}

@@ -1,0 +1,114 @@
+// Ordered compaction: each seen seed becomes one tree record, and its index goes into the lists that it is in, in the
+// order of seeds. All that is the same for a whole tree is computed here, once.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "interface.glsl"
+#include "physics/hash.glsl"
+#include "physics/views.glsl"
+#include "physics/light.glsl"
+#include "forest/cull.glsl"
+
+layout(local_size_x = 256) in;
+layout(std430, binding = 0) readonly buffer ViewBuffer { View v; } view;
+layout(std430, binding = 1) readonly buffer Quads { SeedQuad items[]; } quads;
+layout(std430, binding = 2) readonly buffer Seeds { Seed items[]; } seeds;
+layout(std430, binding = 3) readonly buffer SpeciesTable { Species items[]; } species;
+layout(std430, binding = 4) readonly buffer Classes { uint items[]; } classes;
+layout(std430, binding = 5) readonly buffer Counts { uint items[]; } counts;
+layout(std430, binding = 6) readonly buffer Starts { uint items[]; } starts;
+layout(std430, binding = 7) writeonly buffer Trees { Tree items[]; } trees;
+layout(std430, binding = 8) writeonly buffer Lists { uint items[]; } lists;
+layout(std430, binding = 9) readonly buffer Totals { uint items[]; } totals;
+layout(push_constant) uniform Push { CullParameters p; };
+layout(constant_id = 0) const int RINGS = 9;
+layout(constant_id = 1) const float RESOLUTION = 256.0;
+
+shared uint members[TREE_LISTS * 8];
+
+uint rank_in(uint list, uint thread) {
+    uint rank = 0u, word = thread >> 5u;
+    for (uint w = 0u; w < word; w++) rank += uint(bitCount(members[list * 8u + w]));
+    return rank + uint(bitCount(members[list * 8u + word] & ((1u << (thread & 31u)) - 1u)));
+}
+
+// Lower-hemisphere directions use the opposite view from behind: bit 31 says so.
+uint lookup(vec3 w, out vec2 weights) {
+    uvec3 layers;
+    vec3 all;
+    bool below = w.z < 0.0;
+    view_lookup(below ? -w : w, RINGS, layers, all);
+    weights = all.xy;
+    return layers.x | layers.y << 10u | layers.z << 20u | (below ? 1u << 31u : 0u);
+}
+
+Tree make_tree(Seed s, vec3 centre, Species kind) {
+    View v = view.v;
+    Tree t;
+    t.centre = centre;
+    t.scale = s.scale;
+    float angle = float(s.turn_tint & 0xffffu) * (2.0 * PI / 65536.0);
+    t.turn = vec2(cos(angle), sin(angle));
+    t.species = s.species;
+    t.identity = s.identity;
+    // World to scaled tree space: rotate back, then divide by the half extents.
+    mat3 back = mat3(t.turn.x, -t.turn.y, 0.0, t.turn.y, t.turn.x, 0.0, 0.0, 0.0, 1.0);
+    float distance = max(length(centre), 1e-6);
+    vec3 to_camera = -centre / distance;
+    vec2 weights;
+    t.view_layers = lookup((back * to_camera) / kind.scale_to_metres, weights);
+    t.view_weights = weights;
+    t.light_layers = lookup((back * v.sun_direction) / kind.scale_to_metres, weights);
+    t.light_weights = weights;
+    // One integer mip a tree: the level whose texels are nearest a pixel, on the wider side of the box.
+    float extent = 2.0 * max(kind.scale_to_metres.x, kind.scale_to_metres.z) * s.scale;
+    float texels_per_pixel = RESOLUTION * distance / (extent * v.pixels_at_1m);
+    t.mip = clamp(floor(log2(max(texels_per_pixel, 1e-6)) + 0.5), 0.0, log2(RESOLUTION));
+    // Trees end smoothly at their range (BN12, section 7), and where the camera enters the crown.
+    float reach = distance / (kind.range * s.scale);
+    vec3 eye = (back * -centre) / (kind.scale_to_metres * s.scale);
+    float inside = max(length(eye.xy), abs(eye.z));
+    t.fade = (1.0 - smoothstep(v.fade_distance, 1.0, reach)) * smoothstep(1.05, 1.35, inside);
+    vec2 ground = unpackHalf2x16(s.ground_light);
+    float tint = 1.0 + 0.3 * (float(s.turn_tint >> 16u) / 65535.0 - 0.5);
+    vec3 phase = leaf_phase(to_camera, v.sun_direction, kind.reflectance, kind.transmittance);
+    t.sun = tint * phase * hotspot(to_camera, v.sun_direction, v.hotspot_amplitude, v.hotspot_width) * v.sun_irradiance;
+    // rho / 2 of a leaf that the upper hemisphere lights, times the visibility of the sky above a slope (BN12, eq. 9).
+    t.sky = tint * (kind.reflectance + kind.transmittance) * (0.25 * (1.0 + ground.x)) * v.sky_radiance;
+    t.hole = ground.y * ground.y / (v.hole_radius * v.hole_radius);
+    uint cascade = 0u;
+    for (uint c = 0u; c + 1u < v.cascade_count; c++) cascade += distance > v.cascade_far[c] ? 1u : 0u;
+    t.cascade = v.cascade_count == 0u || distance > v.cascade_far[v.cascade_count - 1u] ? MAX_CASCADES : cascade;
+    return t;
+}
+
+void main() {
+    uint thread = gl_LocalInvocationIndex, group = gl_WorkGroupID.x;
+    for (uint k = thread; k < TREE_LISTS * 8u; k += CULL_GROUP) members[k] = 0u;
+    barrier();
+    uint seen = classes.items[group * CULL_GROUP + thread];
+    uint word = thread >> 5u, bit = 1u << (thread & 31u);
+    if (seen != 0u) {
+        atomicOr(members[word], bit);
+        if ((seen & CLASS_CAMERA) != 0u) atomicOr(members[(1u + (seen & 31u)) * 8u + word], bit);
+        for (uint c = 0u; c < MAX_CASCADES; c++) {
+            if ((seen >> (8u + c) & 1u) != 0u) atomicOr(members[(1u + DISTANCE_BINS + c) * 8u + word], bit);
+        }
+    }
+    barrier();
+    if (seen == 0u || totals.items[0] > p.tree_capacity) return;
+    SeedQuad q = quads.items[group / p.groups_per_region];
+    Seed s = seeds.items[q.region * p.region_capacity + (group % p.groups_per_region) * CULL_GROUP + thread];
+    Species kind = species.items[s.species];
+    uint index = counts.items[group] + rank_in(0u, thread);
+    trees.items[index] = make_tree(s, tree_centre(view.v, q, s, kind), kind);
+    if ((seen & CLASS_CAMERA) != 0u) {
+        uint list = 1u + (seen & 31u);
+        lists.items[starts.items[list] + counts.items[list * p.group_count + group] + rank_in(list, thread)] = index;
+    }
+    for (uint c = 0u; c < MAX_CASCADES; c++) {
+        uint list = 1u + DISTANCE_BINS + c;
+        if ((seen >> (8u + c) & 1u) != 0u) {
+            lists.items[starts.items[list] + counts.items[list * p.group_count + group] + rank_in(list, thread)] = index;
+        }
+    }
+}

@@ -1,0 +1,46 @@
+// Which seeds does the camera see, and which cast shadows into which cascade? Writes each seed's class and, a
+// workgroup, how many of its seeds are in each list. Twin of the decision: src/forest/cull.rs.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "interface.glsl"
+#include "forest/cull.glsl"
+
+layout(local_size_x = 256) in;
+layout(std430, binding = 0) readonly buffer ViewBuffer { View v; } view;
+layout(std430, binding = 1) readonly buffer Quads { SeedQuad items[]; } quads;
+layout(std430, binding = 2) readonly buffer Draws { DrawCommand items[]; } draws;
+layout(std430, binding = 3) readonly buffer Seeds { Seed items[]; } seeds;
+layout(std430, binding = 4) readonly buffer SpeciesTable { Species items[]; } species;
+layout(std430, binding = 5) writeonly buffer Classes { uint items[]; } classes;
+layout(std430, binding = 6) writeonly buffer Counts { uint items[]; } counts;
+layout(push_constant) uniform Push { CullParameters p; };
+
+shared uint members[TREE_LISTS * 8];
+
+void main() {
+    uint thread = gl_LocalInvocationIndex;
+    for (uint k = thread; k < TREE_LISTS * 8u; k += CULL_GROUP) members[k] = 0u;
+    barrier();
+    SeedQuad q = quads.items[gl_WorkGroupID.x / p.groups_per_region];
+    uint slot = (gl_WorkGroupID.x % p.groups_per_region) * CULL_GROUP + thread;
+    uint seen = 0u;
+    if (slot < draws.items[q.region].index_count / 6u) {
+        Seed s = seeds.items[q.region * p.region_capacity + slot];
+        seen = classify(view.v, species.items[s.species], tree_centre(view.v, q, s, species.items[s.species]), s.scale);
+    }
+    classes.items[gl_WorkGroupID.x * CULL_GROUP + thread] = seen;
+    uint word = thread >> 5u, bit = 1u << (thread & 31u);
+    if (seen != 0u) {
+        atomicOr(members[word], bit);
+        if ((seen & CLASS_CAMERA) != 0u) atomicOr(members[(1u + (seen & 31u)) * 8u + word], bit);
+        for (uint c = 0u; c < MAX_CASCADES; c++) {
+            if ((seen >> (8u + c) & 1u) != 0u) atomicOr(members[(1u + DISTANCE_BINS + c) * 8u + word], bit);
+        }
+    }
+    barrier();
+    if (thread < TREE_LISTS) {
+        uint count = 0u;
+        for (uint w = 0u; w < 8u; w++) count += uint(bitCount(members[thread * 8u + w]));
+        counts.items[thread * p.group_count + gl_WorkGroupID.x] = count;
+    }
+}

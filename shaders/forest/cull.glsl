@@ -1,0 +1,50 @@
+// The decision of the cull. `precise` and a fixed order of operations let src/forest/cull.rs agree to the bit.
+
+const uint CLASS_CAMERA = 1u << 5u;   // low five bits: distance bin
+const uint CLASS_CASCADE = 1u << 8u;  // and three more for the other cascades
+
+// Centre of a tree's box from the camera, m.
+vec3 tree_centre(View v, SeedQuad q, Seed s, Species kind) {
+    precise vec2 xy = (q.corner + s.position) - v.quad_offset;
+    precise float z = (s.ground - v.camera_height) + kind.centre * s.scale;
+    return vec3(xy, z);
+}
+
+float precise_dot(vec3 a, vec3 b) {
+    precise float d = a.x * b.x;
+    d = d + a.y * b.y;
+    d = d + a.z * b.z;
+    return d;
+}
+
+// 0 if no one sees it.
+uint classify(View v, Species kind, vec3 centre, float scale) {
+    precise float radius = kind.bounding_radius * scale;
+    precise float range = kind.range * scale;
+    precise float d2 = precise_dot(centre, centre);
+    precise float range2 = range * range;
+    if (d2 > range2) return 0u;
+    uint seen = 0u;
+    bool inside = true;
+    for (int k = 0; k < 6; k++) {
+        precise float d = precise_dot(v.planes[k].xyz, centre) + v.planes[k].w;
+        inside = inside && d >= -radius;
+    }
+    if (inside) {
+        uint bin = 0u;
+        for (uint k = 0u; k < DISTANCE_BINS - 1u; k++) bin += d2 > v.bins[k >> 2u][k & 3u] ? 1u : 0u;
+        seen = CLASS_CAMERA | bin;
+    }
+    for (uint c = 0u; c < v.cascade_count; c++) {
+        bool casts = true;
+        for (uint k = 0u; k < 2u; k++) {
+            precise float d = precise_dot(v.cascade_planes[3u * c + k].xyz, centre) + v.cascade_centres[c][k];
+            casts = casts && abs(d) <= v.cascade_planes[3u * c + k].w + radius;
+        }
+        // Along the sun's direction only what lies beyond the cascade is out: anything before it casts into it.
+        precise float along = precise_dot(v.cascade_planes[3u * c + 2u].xyz, centre) + v.cascade_centres[c].z;
+        casts = casts && along >= -(v.cascade_planes[3u * c + 2u].w + radius);
+        if (casts) seen |= CLASS_CASCADE << c;
+    }
+    return seen;
+}

@@ -1,0 +1,24 @@
+// Vertices of the terrain: a grid that morphs to the next coarser one with distance, so that levels meet without cracks
+// and change without popping. Positions are differences of whole finest-grid steps, equal to the bit in both quads.
+
+layout(std430, binding = 0) readonly buffer ViewBuffer { View v; } view;
+layout(std430, binding = 1) readonly buffer Quads { TerrainQuad items[]; } quads;
+layout(binding = 2) uniform sampler2DArray height_tiles;
+layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
+
+vec3 grid_position(TerrainQuad q, ivec2 at) {
+    float height = texelFetch(height_tiles, ivec3(at, q.layer), 0).r;
+    vec2 grid = min(vec2(q.corner + at * q.spacing), p.last);
+    // Relative to the camera's cell first: exact, whatever the distance from the corner of the terrain.
+    return vec3((grid - vec2(view.v.grid_camera)) * p.step - view.v.grid_offset, height - view.v.camera_height);
+}
+
+// Position from the camera, and position in the quad in [0, 1].
+vec3 terrain_vertex(TerrainQuad q, uint vertex, out vec2 within) {
+    ivec2 at = ivec2(vertex % TERRAIN_HEIGHTS, vertex / TERRAIN_HEIGHTS);
+    vec3 fine = grid_position(q, at);
+    float morph = smoothstep(q.morph.x, q.morph.y, length(fine));
+    vec3 coarse = grid_position(q, at - (at & 1));
+    within = mix(vec2(at), vec2(at - (at & 1)), morph) / float(TERRAIN_CELLS);
+    return fine * (1.0 - morph) + coarse * morph;
+}

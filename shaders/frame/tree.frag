@@ -1,0 +1,13 @@
+// A z-field tree: radiance.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "interface.glsl"
+#include "frame/tree_shade.glsl"
+
+layout(location = 0) out vec4 radiance;
+
+void main() {
+    vec3 sun_part, sky_part;
+    shade(sun_part, sky_part);
+    radiance = vec4(sun_part + sky_part, 1.0);
+}

@@ -1,0 +1,16 @@
+// A z-field tree: sun and sky part apart, coverage in the sky part's fourth channel, species.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "interface.glsl"
+#include "frame/tree_shade.glsl"
+
+layout(location = 0) out vec4 sun_layer;
+layout(location = 1) out vec4 sky_layer;
+layout(location = 2) out uint species_layer;
+
+void main() {
+    vec3 sun_part, sky_part;
+    species_layer = shade(sun_part, sky_part);
+    sun_layer = vec4(sun_part, 1.0);
+    sky_layer = vec4(sky_part, 1.0);
+}

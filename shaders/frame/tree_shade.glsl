@@ -1,0 +1,78 @@
+// One fragment of a z-field tree (BN12, section 5): two iterations for the view ray, one for the light ray, light,
+// depth and sample mask, all from the same last fetch.
+#include "physics/masks.glsl"
+#include "physics/zfield.glsl"
+#include "physics/shadow.glsl"
+
+layout(location = 0) in vec4 view_p[3];
+layout(location = 3) in vec3 light_p[3];
+layout(location = 6) in vec3 shadow_p;
+layout(location = 7) flat in vec4 view_c[3];
+layout(location = 10) flat in vec4 light_c[3];
+layout(location = 13) flat in vec3 light_d[3];
+layout(location = 16) flat in vec4 shadow_c;
+layout(location = 17) flat in vec4 weights;
+layout(location = 18) flat in vec4 optics;
+layout(location = 19) flat in vec4 sun;
+layout(location = 20) flat in vec4 sky;
+layout(location = 21) flat in uvec4 tree_bits;
+layout(location = 22) flat in float dither;
+
+layout(binding = 6) uniform sampler2DArray views;
+layout(binding = 7) uniform usampler2DArray shadow_map;
+layout(constant_id = 3) const uint SAMPLES = 4u;
+layout(constant_id = 4) const int VIEW_ITERATIONS = 2;
+layout(constant_id = 5) const int LIGHT_ITERATIONS = 1;
+layout(constant_id = 6) const bool HAS_SUN = true;
+
+// Returns the species, counted from 1. Sets sample mask and depth.
+uint shade(out vec3 sun_part, out vec3 sky_part) {
+    vec3 p[3], d[3];
+    for (int i = 0; i < 3; i++) {
+        p[i] = view_p[i].xyz;
+        d[i] = view_c[i].xyz - p[i];
+    }
+    vec3 w = vec3(weights.xy, 1.0 - weights.x - weights.y);
+    vec3 layers = vec3(view_c[0].w, view_c[1].w, view_c[2].w);
+    bool below = (tree_bits.w >> 4u & 1u) != 0u;
+    Surface at = Surface(0.0, 0.0, 0.0);
+    for (int k = 0; k < VIEW_ITERATIONS; k++) at = zfield_fetch(views, p, d, layers, w, optics.x, at.s, below);
+    // Nothing behind the eye is seen: there s would be 1 or more.
+    float s = clamp(at.s, -1e3, 0.999);
+    float opacity = at.s < 0.999 ? at.opacity * optics.z : 0.0;
+    uint covered = covered_samples(opacity, dither, SAMPLES);
+    gl_SampleMask[0] = int(mask_column(tree_bits.xyz, covered, SAMPLES));
+    // Reverse Z: depth is near / distance, and the distance shrinks by 1 - s.
+    gl_FragDepth = min(gl_FragCoord.z / (1.0 - s), 1.0);
+
+    sun_part = vec3(0.0);
+    if (HAS_SUN) {
+        float lit = 1.0, metres = 0.0;
+        if (LIGHT_ITERATIONS > 0) {
+            vec3 lp[3], ld[3];
+            for (int i = 0; i < 3; i++) {
+                lp[i] = mix(light_p[i], light_c[i].xyz, s);
+                ld[i] = light_d[i];
+            }
+            vec3 lw = vec3(weights.zw, 1.0 - weights.z - weights.w);
+            vec3 light_layers = vec3(light_c[0].w, light_c[1].w, light_c[2].w);
+            // Start on the plane through the centre across the light.
+            metres = -dot(lw, vec3(lp[0].z, lp[1].z, lp[2].z)) / dot(lw, vec3(ld[0].z, ld[1].z, ld[2].z));
+            for (int k = 0; k < LIGHT_ITERATIONS; k++) {
+                metres = zfield_fetch(views, lp, ld, light_layers, lw, optics.x, metres, false).s;
+            }
+            metres = max(metres, 0.0);
+            lit = exp(-optics.y * metres);
+        }
+        vec3 entry = mix(shadow_p, shadow_c.xyz, s);
+        entry.z += metres * shadow_c.w;
+        uint cascade = tree_bits.w & 15u;
+        float visible = sun_visibility(shadow_map, entry, min(cascade, 3u));
+        sun_part = sun.rgb * (lit * (cascade < 4u ? visible : 1.0));
+    }
+    // Depth under the top of the canopy, for the sky through the hole around the tree.
+    float height = mix(view_p[0].w, optics.w, s);
+    float below_top = max(1.0 - height, 0.0) * sky.w;
+    sky_part = sky.rgb * (at.occlusion / (1.0 + below_top * below_top * sun.w));
+    return (tree_bits.w >> 8u) + 1u;
+}

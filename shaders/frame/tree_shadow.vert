@@ -1,0 +1,51 @@
+// A quad around one tree that faces the sun, in one cascade; the layer is chosen here.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_ARB_shader_viewport_layer_array : require
+#include "interface.glsl"
+#include "physics/zfield.glsl"
+#include "frame/tree_space.glsl"
+
+layout(std430, binding = 0) readonly buffer ViewBuffer { View v; } view;
+layout(std430, binding = 1) readonly buffer Trees { Tree items[]; } trees;
+layout(std430, binding = 2) readonly buffer Lists { uint items[]; } lists;
+layout(std430, binding = 3) readonly buffer SpeciesTable { Species items[]; } species;
+layout(std430, binding = 4) readonly buffer Bases { ViewBasis items[]; } bases;
+layout(push_constant) uniform Push { uint cascade; };
+layout(constant_id = 1) const float RESOLUTION = 256.0;
+
+layout(location = 0) out vec3 light_p[3];
+layout(location = 3) out float depth;
+layout(location = 4) flat out vec4 light_d[3]; // w: layer
+layout(location = 7) flat out vec4 optics;     // weights of two views, mip, opacity factor
+layout(location = 8) flat out float depth_per_metre;
+
+void main() {
+    View v = view.v;
+    Tree t = trees.items[lists.items[gl_VertexIndex >> 2]];
+    Species kind = species.items[t.species];
+    vec3 half_extent = kind.scale_to_metres * t.scale;
+    vec3 l = (tree_rotation(t) * v.sun_direction) / half_extent;
+    vec3 w = normalize(l), right, up;
+    frame_across(w, right, up);
+    float mip = clamp(floor(log2(RESOLUTION * v.cascade_texel[cascade] /
+                                 (2.0 * max(half_extent.x, half_extent.z))) + 0.5), 0.0, log2(RESOLUTION));
+    vec2 margin = exp2(mip) / RESOLUTION * vec2(1.0, 1.5) +
+                  0.5 * v.cascade_texel[cascade] / vec2(half_extent.x, min(half_extent.x, half_extent.z));
+    vec2 corner = vec2((gl_VertexIndex & 1) == 0 ? -1.0 : 1.0, (gl_VertexIndex & 2) == 0 ? -1.0 : 1.0);
+    vec3 p = right * (corner.x * (1.0 + margin.x)) + up * (corner.y * (length(w.xy) + w.z + margin.y));
+    mat4 shadow = v.cascade_from_world[cascade];
+    vec4 at = shadow * vec4(world_from_tree(t, kind, p), 1.0);
+    vec3 layers = unpack_layers(t.light_layers, kind.first_layer);
+    for (int i = 0; i < 3; i++) {
+        ViewBasis b = bases.items[uint(layers[i]) - kind.first_layer];
+        light_p[i] = project(b, p);
+        light_d[i] = vec4(project(b, l), layers[i]);
+    }
+    depth = at.z;
+    depth_per_metre = (shadow * vec4(v.sun_direction, 0.0)).z;
+    optics = vec4(t.light_weights, mip, t.fade);
+    // Trees before the cascade's near side cast from there: the fragment writes their depth.
+    gl_Position = vec4(at.xy, 0.5, 1.0);
+    gl_Layer = int(cascade);
+}

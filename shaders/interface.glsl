@@ -1,0 +1,197 @@
+// What host and shaders share, defined once: build.rs writes the Rust side of every struct and constant.
+
+const uint MAX_SPECIES = 8u;          // most species in a scene
+const uint MAX_CASCADES = 4u;         // most shadow cascades
+const uint DISTANCE_BINS = 32u;       // bins of the camera's list of trees, front to back
+const uint TREE_LISTS = 37u;          // lists that a seed can be in: all, one of the bins, each cascade
+const uint CULL_GROUP = 256u;         // seeds a workgroup of the cull
+const uint TERRAIN_CELLS = 32u;       // mesh cells along a side of a terrain quad
+const uint TERRAIN_HEIGHTS = 33u;     // height samples along a side of a terrain tile
+const uint TERRAIN_SLOPES = 65u;      // slope samples along a side of a terrain tile
+const uint GRID_SIDE = 128u;          // side of the toroidal page table of seed quads
+const uint NO_PAGE = 0xffffffffu;     // a seed quad without region
+
+// Everything of a frame that does not depend on the object drawn. World positions are relative to the camera.
+struct View {
+    mat4 clip_from_world;             // reverse Z, infinite far
+    mat4 cascade_from_world[4];       // xy in [-1, 1]; z in [0, 1], 1 at the sun's side
+    vec4 planes[6];                   // of the view frustum: dot(xyz, p) + w >= 0 inside
+    vec4 cascade_planes[12];          // three a cascade: direction and half extent: abs(dot(xyz, p) + c) <= w
+    vec4 cascade_centres[4];          // c of the three cascade planes
+    vec4 cascade_texel;               // metres a texel of each cascade
+    vec4 cascade_far;                 // distance to which each cascade is used, m
+    vec4 bins[8];                     // squared upper distances of the distance bins
+    vec3 sun_direction;               // unit, towards the sun
+    uint cascade_count;               // 0: no sun
+    vec3 sun_irradiance;              // on a plane facing the sun, times the exposure scale
+    float near_plane;                 // m
+    vec3 sky_radiance;                // mean over the upper hemisphere, times the exposure scale
+    float camera_height;              // z of the camera in the terrain's system, m
+    vec2 size;                        // pixels
+    float pixels_at_1m;               // pixels that one metre covers at one metre
+    float fade_distance;              // distance over scale over species range at which trees begin to fade
+    ivec2 grid_camera;                // camera's cell of the terrain's finest grid
+    vec2 grid_offset;                 // camera's position in that cell, m
+    ivec2 quad_camera;                // camera's seed quad
+    vec2 quad_offset;                 // camera's position in that quad, m
+    float quad_side;                  // side of a seed quad, m
+    float hotspot_amplitude;          // a1 of BN12 eq. 8
+    float hotspot_width;              // a2 of BN12 eq. 8, 1/rad
+    float ground_contrast;            // a3 of BN12 eq. 10
+    float hole_radius;                // radius of the hole around a tree times sqrt(density), BN12 eq. 9
+    float mean_area;                  // mean horizontal area of a tree in the scene, m2
+    uint species_count;               // species in the scene
+    uint samples;                     // samples a pixel
+};
+
+// One species.
+struct Species {
+    vec3 scale_to_metres;             // S: half extents of the tree box, m
+    float centre;                     // height of the box's centre o above the trunk base, m
+    vec3 reflectance;                 // of a leaf
+    float extinction;                 // of the crown, 1/m
+    vec3 transmittance;               // of a leaf
+    float range;                      // distance to which a tree of scale 1 is drawn one by one, m
+    float height;                     // of the tree, m
+    float crown_radius;               // sqrt(A / pi), m
+    float bounding_radius;            // of a sphere about o, m
+    uint first_layer;                 // of its views in the z-field array
+    vec2 scale_range;                 // smallest and largest random scale
+    float max_density;                // trees per m2 where its map is 1
+    uint density_layer;               // of its map in the density array; NO_PAGE: 1 everywhere
+    vec2 between_heights;             // smooth limits on the ground's height, m
+    float below_slope;                // smooth limit on the slope, as a tangent
+    float height_softness;            // width of the smooth height limits, m
+    vec2 map_size;                    // texels of its density map in use
+    float slope_softness;             // width of the smooth slope limit, as a tangent
+    uint pad;                         // unused
+};
+
+// Rows of the projection of scaled tree space into one z-field view.
+struct ViewBasis {
+    vec4 u;                           // texture u - 0.5 = dot(u, p)
+    vec4 v;                           // texture v - 0.5 = dot(v, p)
+    vec4 depth;                       // depth towards the viewer = dot(depth, p)
+};
+
+// One tree, as produced for a seed quad.
+struct Seed {
+    vec2 position;                    // from the quad's south-west corner, m
+    float ground;                     // height of the ground there, m
+    float scale;                      // of the model
+    uint turn_tint;                   // low half: rotation in 1/65536 turn; high half: tint
+    uint identity;                    // hash from which the tree's other random numbers come
+    uint ground_light;                // two halves: n.u_z of the ground; square root of the local density
+    uint species;                     // index
+};
+
+// A seed quad with a region of seeds.
+struct SeedQuad {
+    ivec2 tile;                       // index of its south-west Wang tile
+    ivec2 texel;                      // height map texel of its south-west corner
+    vec2 texel_offset;                // and the position in that texel
+    vec2 corner;                      // south-west corner from the camera's quad, m; set for culling
+    uint region;                      // its region in the seed buffer
+    uint first_position;              // its listed trees
+    uint position_count;              // and their number
+    uint pad;                         // unused
+};
+
+// A listed tree, binned to its quad.
+struct ListedTree {
+    vec2 position;                    // from the quad's south-west corner, m
+    float scale;                      // 0: drawn from the species' range
+    float turn;                       // rotation in turns; negative: drawn
+    uint species;                     // index
+    uint index;                       // in its list
+};
+
+// What producing seeds takes, besides the quads.
+struct SeedParameters {
+    vec2 extent;                      // of the terrain, m
+    float quad_side;                  // side of a seed quad, m
+    float tile_side;                  // side of a Wang tile, m
+    float cell_size;                  // metres a height map texel
+    float pattern_density;            // points of the pattern per m2
+    uint seed;                        // of the scene
+    uint region_capacity;             // seeds a region
+    uint tiles_per_side;              // Wang tiles along a quad; 0: no pattern
+    uint points_per_tile;             // slots of a Wang tile in the pattern buffer
+    uint first_quad;                  // of this dispatch
+    uint has_heights;                 // 0: a level plain
+};
+
+// A point of a Wang tile pattern.
+struct PatternPoint {
+    vec2 position;                    // in [0, 1) of the tile's side; x negative: unused slot
+};
+
+// A tree that is seen by the camera or a cascade, with what drawing it takes.
+struct Tree {
+    vec3 centre;                      // of its box, from the camera, m
+    float scale;                      // of the model
+    vec2 turn;                        // cosine and sine of its rotation
+    uint species;                     // index
+    uint identity;                    // hash
+    uint view_layers;                 // three z-field views nearest the view direction, 10 bits each; bit 31: from below
+    uint light_layers;                // the same for the light direction
+    vec2 view_weights;                // of the first two views
+    vec2 light_weights;               // of the first two light views
+    float mip;                        // of the views
+    float fade;                       // factor of the opacity
+    vec3 sun;                         // radiance of a lit leaf: phase function, hotspot and irradiance
+    float hole;                       // 1 / squared radius of the hole around it, 1/m2
+    vec3 sky;                         // radiance of a leaf under the whole sky
+    uint cascade;                     // for its shadow lookups
+};
+
+// An indexed indirect draw.
+struct DrawCommand {
+    uint index_count;                 // indices
+    uint instance_count;              // instances
+    uint first_index;                 // first index
+    int vertex_offset;                // added to each index
+    uint first_instance;              // first instance
+};
+
+// What culling takes.
+struct CullParameters {
+    uint group_count;                 // workgroups
+    uint groups_per_region;           // workgroups a region
+    uint region_capacity;             // seeds a region
+    uint tree_capacity;               // trees that fit
+};
+
+// One terrain quad to draw.
+struct TerrainQuad {
+    ivec2 corner;                     // south-west corner on the terrain's finest grid
+    int spacing;                      // finest grid steps a mesh cell
+    uint layer;                       // of its tiles
+    vec2 morph;                       // distances at which vertices begin and end to morph to the next level, m
+};
+
+// What the terrain takes.
+struct TerrainParameters {
+    vec2 last;                        // north-east corner of the terrain on the finest grid (not always whole)
+    float step;                       // metres a finest grid step
+    float texels_per_step;            // height map texels a finest grid step
+    vec2 extent;                      // m
+    uint first_quad;                  // of this draw or dispatch
+    uint has_heights;                 // 0: a level plain
+};
+
+// A coverage tile to draw.
+struct CoverageTile {
+    uint layer;                       // of the tile
+    uint region;                      // whose seeds are drawn
+    vec2 offset;                      // corner of that region's quad from the tile's, m
+    float side;                       // of a quad, m
+    uint quad;                        // of the tile in the list of seed quads
+};
+
+// What tone mapping takes.
+struct TonemapParameters {
+    uvec2 size;                       // pixels
+    float exposure;                   // factor before the curve
+    uint parts;                       // images whose sum is the radiance: 1 or 2
+};

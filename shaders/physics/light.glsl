@@ -1,0 +1,39 @@
+// Light at leaves and on the ground (BN12, section 5). Twin: src/physics/light.rs.
+
+const float PI = 3.141592653589793;
+
+// Angle between two unit vectors. atan2 keeps its precision at 0 and pi, where acos loses it.
+float angle_between(vec3 a, vec3 b) { return atan(length(cross(a, b)), dot(a, b)); }
+
+// Leaf-scale hotspot (BN12, eq. 8): 1 - a1 (1 - exp(-a2 angle)), largest at v = l.
+float hotspot(vec3 v, vec3 l, float a1, float a2) {
+    return 1.0 - a1 * (1.0 - exp(-a2 * angle_between(v, l)));
+}
+
+// Radiance of fully lit, uniformly oriented bi-Lambertian leaves per irradiance: rho p of BN12 eq. 7 from reflectance r
+// and transmittance t. Ross (1981): Gamma = (r + t) (sin b - b cos b) / (3 pi) + t cos b / 3 with b the angle between
+// the light's propagation (-l) and v, and radiance 2 Gamma / pi because leaves extinguish half their area per volume.
+vec3 leaf_phase(vec3 v, vec3 l, vec3 r, vec3 t) {
+    float b = PI - angle_between(v, l);
+    float s = sin(b), c = cos(b);
+    vec3 gamma = (r + t) * ((s - b * c) / (3.0 * PI)) + t * (c / 3.0);
+    return max(gamma, vec3(0.0)) * (2.0 / PI);
+}
+
+// Sky seen from depth d on the axis of a cylindrical hole (BN12, eq. 9): 1 / (1 + d2 / r2), with 1 / r2 given.
+float hole_occlusion(float d, float inverse_r2) { return 1.0 / (1.0 + d * d * inverse_r2); }
+
+// 2 E3(x): the mean sky visibility of the ground under opaque Poisson crowns with optical thickness x = density times
+// area (PAPERS: D exactly). Swamee & Ohija's E1 and the recurrence E3 = (exp(-x) - x (exp(-x) - x E1)) / 2.
+float ground_visibility(float x) {
+    if (x < 1e-4) return 1.0 - 2.0 * x;
+    x = min(x, 40.0);
+    float a = log((0.56146 / x + 0.65) * (1.0 + x));
+    float b = pow(x, 4.0) * exp(7.7 * x) * pow(2.0 + x, 3.7);
+    float e1 = pow(pow(a, -7.7) + b, -0.13);
+    float e = exp(-x);
+    return clamp(e - x * (e - x * e1), 0.0, 1.0);
+}
+
+// Contrast of the ground near trees (BN12, eq. 10): mean 1 where the expected coverage is right; never negative.
+float ground_contrast(float coverage, float expected, float a3) { return max(1.0 - a3 * (coverage - expected), 0.0); }

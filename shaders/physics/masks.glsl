@@ -1,0 +1,14 @@
+// Sub-pixel coverage masks (BN12, section 8). Twin: src/physics/masks.rs.
+
+// Number of samples covered by opacity alpha: alpha * samples rounded up or down, with the fraction as the
+// probability of rounding up over a uniform dither, so that the expected coverage is alpha exactly.
+uint covered_samples(float alpha, float dither, uint samples) {
+    return uint(clamp(floor(alpha * float(samples) + dither), 0.0, float(samples)));
+}
+
+// Column k of a tree's row of the combination table: samples + 1 masks of `samples` bits, packed low first.
+uint mask_column(uvec3 row, uint k, uint samples) {
+    uint bit = k * samples;
+    uint word = bit < 32u ? row.x : (bit < 64u ? row.y : row.z);
+    return (word >> (bit & 31u)) & ((1u << samples) - 1u);
+}

@@ -1,0 +1,171 @@
+//! Culling and ordered compaction: which seeds does a frame draw, where, and in which order.
+//!
+//! Three dispatches: classify every seed and count, a workgroup, how many are in each list; prefix sums over the counts;
+//! write every tree's record and its index into the lists, each at the place that the sums give it. No atomics on
+//! memory decide any order, so the same seeds give the same bits. [`classify`] is the CPU's twin of the decision.
+
+use super::seeds::SeedData;
+use super::species::SpeciesData;
+use crate::gpu::interface::{
+    CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, MAX_CASCADES, Seed, SeedQuad, Species, TREE_LISTS,
+    Tree, View,
+};
+use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, shaders};
+use crate::plan::Plan;
+use crate::scene::Scene;
+use crate::{Error, Result};
+
+const _: () = assert!(TREE_LISTS == 1 + DISTANCE_BINS + MAX_CASCADES);
+
+/// A seed's class: seen by the camera; the low five bits are its distance bin.
+pub const CLASS_CAMERA: u32 = 1 << 5;
+/// A seed's class: casts into the first cascade; and three more bits for the others.
+pub const CLASS_CASCADE: u32 = 1 << 8;
+
+/// Buffers and programs of the cull.
+pub struct CullData {
+    /// Records of all trees that anyone sees.
+    pub trees: Buffer,
+    /// Indices into `trees`: the camera's, then each cascade's, `tree_capacity` apart.
+    pub lists: Buffer,
+    /// Draw commands: the camera's, then each cascade's.
+    pub commands: Buffer,
+    /// Number of trees in each list.
+    pub totals: Buffer,
+    /// Class of every seed, workgroup after workgroup.
+    pub classes: Buffer,
+    counts: Buffer,
+    starts: Buffer,
+    programs: [Program; 4],
+    capacity: u32,
+}
+
+/// How many trees a frame draws.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct TreeCounts {
+    /// Trees that the camera or a cascade sees.
+    pub records: u32,
+    /// Trees in view.
+    pub camera: u32,
+    /// Casters of each cascade.
+    pub cascades: Vec<u32>,
+}
+
+impl CullData {
+    /// Allocates for a plan.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
+        let slots = u64::from(plan.seed_regions) * u64::from(plan.region_capacity);
+        let groups = slots / u64::from(CULL_GROUP);
+        let trees = u64::from(plan.tree_capacity);
+        let constants = [(0, scene.settings.view_rings), (1, (scene.settings.view_resolution as f32).to_bits())];
+        Ok(CullData {
+            trees: gpu.buffer("trees", trees * size_of::<Tree>() as u64)?,
+            lists: gpu.buffer("tree lists", trees * 4 * u64::from(1 + MAX_CASCADES))?,
+            commands: gpu.buffer("tree draws", 5 * size_of::<DrawCommand>() as u64)?,
+            totals: gpu.buffer("tree totals", 4 * u64::from(TREE_LISTS))?,
+            classes: gpu.buffer("seed classes", slots * 4)?,
+            counts: gpu.buffer("list counts", groups * 4 * u64::from(TREE_LISTS))?,
+            starts: gpu.buffer("list starts", 4 * u64::from(TREE_LISTS))?,
+            programs: [
+                gpu.compute(&shaders::FOREST_CULL_COMP, &[])?,
+                gpu.compute(&shaders::FOREST_SCAN_COMP, &[])?,
+                gpu.compute(&shaders::FOREST_COMMANDS_COMP, &[])?,
+                gpu.compute(&shaders::FOREST_COMPACT_COMP, &constants)?,
+            ],
+            capacity: plan.tree_capacity,
+        })
+    }
+
+    /// Records the cull of `seeds.visible` quads.
+    pub fn record(&self, recorder: &mut Recorder, view: &Buffer, seeds: &SeedData, species: &SpeciesData) {
+        let groups_per_region = seeds.region_capacity / CULL_GROUP;
+        let parameters = CullParameters {
+            group_count: seeds.visible * groups_per_region,
+            groups_per_region,
+            region_capacity: seeds.region_capacity,
+            tree_capacity: self.capacity,
+        };
+        let shared = [
+            ("view", Resource::Buffer(view)),
+            ("quads", Resource::Buffer(&seeds.quads)),
+            ("draws", Resource::Buffer(&seeds.draws)),
+            ("seeds", Resource::Buffer(&seeds.seeds)),
+            ("species", Resource::Buffer(&species.table)),
+            ("classes", Resource::Buffer(&self.classes)),
+            ("counts", Resource::Buffer(&self.counts)),
+            ("totals", Resource::Buffer(&self.totals)),
+            ("starts", Resource::Buffer(&self.starts)),
+            ("commands", Resource::Buffer(&self.commands)),
+            ("trees", Resource::Buffer(&self.trees)),
+            ("lists", Resource::Buffer(&self.lists)),
+        ];
+        let groups = [parameters.group_count, 1, 1];
+        for (name, program, size) in [
+            ("cull", 0, groups),
+            ("prefix sums", 1, [1, 1, 1]),
+            ("draw commands", 2, [1, 1, 1]),
+            ("compact", 3, groups),
+        ] {
+            recorder.compute(name, |pass| {
+                pass.bind(&self.programs[program], &shared);
+                pass.push(&parameters);
+                pass.dispatch(size);
+            });
+        }
+    }
+
+    /// Reads how many trees the last frame drew.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when there were more than the plan holds.
+    pub fn counts(&self, gpu: &Gpu, cascades: usize) -> Result<TreeCounts> {
+        let totals: Vec<u32> = gpu.read(&self.totals, 0, TREE_LISTS as usize)?;
+        if totals[0] > self.capacity {
+            return Err(Error::Usage(format!(
+                "{} trees in view, and the plan holds {}: raise zfield_max_trees or zfield_min_pixels",
+                totals[0], self.capacity
+            )));
+        }
+        let bins = 1..1 + DISTANCE_BINS as usize;
+        Ok(TreeCounts {
+            records: totals[0],
+            camera: totals[bins.clone()].iter().sum(),
+            cascades: totals[bins.end..bins.end + cascades].to_vec(),
+        })
+    }
+}
+
+/// Centre of a tree's box from the camera; twin of `tree_centre` in `shaders/forest/cull.glsl`, to the bit.
+pub fn tree_centre(view: &View, quad: &SeedQuad, seed: &Seed, species: &Species) -> [f32; 3] {
+    let xy = [0, 1].map(|k| (quad.corner[k] + seed.position[k]) - view.quad_offset[k]);
+    [xy[0], xy[1], (seed.ground - view.camera_height) + species.centre * seed.scale]
+}
+
+/// Class of a seed, 0 if no one sees it; twin of `classify` in `shaders/forest/cull.glsl`, to the bit.
+pub fn classify(view: &View, species: &Species, centre: [f32; 3], scale: f32) -> u32 {
+    let dot = |a: &[f32]| (a[0] * centre[0] + a[1] * centre[1]) + a[2] * centre[2];
+    let radius = species.bounding_radius * scale;
+    let range = species.range * scale;
+    let d2 = dot(&centre);
+    if d2 > range * range {
+        return 0;
+    }
+    let mut seen = 0;
+    if view.planes.iter().all(|p| dot(&p[..3]) + p[3] >= -radius) {
+        let bins = (0..DISTANCE_BINS as usize - 1).filter(|k| d2 > view.bins[k / 4][k % 4]).count();
+        seen = CLASS_CAMERA | bins as u32;
+    }
+    for c in 0..view.cascade_count as usize {
+        let plane = |k: usize| &view.cascade_planes[3 * c + k];
+        let along = |k: usize| dot(&plane(k)[..3]) + view.cascade_centres[c][k];
+        let casts = (0..2).all(|k| along(k).abs() <= plane(k)[3] + radius)
+            && along(2) >= -(plane(2)[3] + radius);
+        if casts {
+            seen |= CLASS_CASCADE << c;
+        }
+    }
+    seen
+}

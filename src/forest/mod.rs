@@ -1,0 +1,10 @@
+//! What lives between frames: the terrain quadtree and its tiles, tree seeds and their coverage tiles, and the lists
+//! of trees that a frame draws.
+
+pub mod cache;
+pub mod cull;
+pub mod pattern;
+pub mod quadtree;
+pub mod seeds;
+pub mod species;
+pub mod terrain;

@@ -1,0 +1,370 @@
+//! Tree seeds: which quads of ground have them, where in the seed buffer, and their coverage tiles.
+
+use std::collections::HashMap;
+
+use super::cache::SlotCache;
+use super::quadtree::{Bounds, Quadtree};
+use super::species::SpeciesData;
+use super::terrain::TerrainData;
+use crate::frame::camera::Eye;
+use crate::gpu::interface::{
+    CoverageTile, DrawCommand, GRID_SIDE, ListedTree, NO_PAGE, Seed, SeedParameters, SeedQuad,
+};
+use crate::gpu::{
+    Attachment, Blend, Buffer, DepthTest, GraphicsDesc, Gpu, Image, ImageDesc, Program, Recorder, Resource,
+    Sampler, Targets, Topology, shaders, vk,
+};
+use crate::plan::Plan;
+use crate::scene::{Distribution, Scene};
+use crate::{Error, Result};
+
+/// Both push constants of an expected-coverage draw.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct ExpectedCoverage {
+    parameters: SeedParameters,
+    tile: CoverageTile,
+}
+
+/// Seeds and coverage of the quads near the camera.
+pub struct SeedData {
+    /// Seeds, region after region.
+    pub seeds: Buffer,
+    /// A draw command a region; its index count is six times the region's number of seeds.
+    pub draws: Buffer,
+    /// This frame's quads: `visible` ones, then those to produce.
+    pub quads: Buffer,
+    /// The visible quads as uploaded, for the CPU's twin of the cull.
+    pub visible_quads: Vec<SeedQuad>,
+    /// Number of visible quads.
+    pub visible: u32,
+    /// Seeds a region.
+    pub region_capacity: u32,
+    /// Coverage by trees, one layer a region.
+    pub coverage: Image,
+    /// Page table: region of the quads around the camera, toroidal.
+    pub pages: Buffer,
+    /// Indices of a quad a tree: 0, 1, 2, 2, 1, 3, and so on.
+    pub quad_indices: Buffer,
+    pattern: Buffer,
+    listed: Buffer,
+    species_count: Buffer,
+    listed_ranges: HashMap<(i32, i32), (u32, u32)>,
+    cache: SlotCache<(i32, i32)>,
+    covered: Vec<Option<(i32, i32)>>,
+    programs: (Program, Program, Program),
+    parameters: SeedParameters,
+    quad_count: [i32; 2],
+    top: f64,
+}
+
+/// What a frame has to produce.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SeedWork {
+    /// First and number of quads whose seeds are to be produced, in [`SeedData::quads`].
+    pub fresh: (u32, u32),
+    /// Coverage tiles to draw: the quad's index in [`SeedData::quads`], its region, and the regions around it with the
+    /// offset of their quads.
+    tiles: Vec<(u32, u32, Vec<(u32, [f64; 2])>)>,
+}
+
+impl SeedData {
+    /// Allocates for a plan and bins listed trees to their quads.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
+        let slots = u64::from(plan.seed_regions) * u64::from(plan.region_capacity);
+        let (listed, listed_ranges) = bin_listed(scene, plan.quad_side);
+        let indices: Vec<u32> = (0..plan.tree_capacity.max(plan.region_capacity))
+            .flat_map(|k| [0, 1, 2, 2, 1, 3].map(|c| 4 * k + c))
+            .collect();
+        let pattern = plan.pattern.as_ref().map_or_else(Vec::new, |p| p.packed());
+        let side = [(0, (plan.coverage_size as f32).to_bits()), (1, scene.species.len() as u32)];
+        let coverage_program = |vert, frag, blend, constants| {
+            gpu.graphics(&GraphicsDesc {
+                vert,
+                frag,
+                colors: &[vk::Format::R8G8B8A8_UNORM],
+                samples: 1,
+                depth: DepthTest::None,
+                blend,
+                topology: Topology::Triangles,
+                constants,
+            })
+        };
+        let heights = scene.terrain.heights.is_some();
+        Ok(SeedData {
+            seeds: gpu.buffer("seeds", slots * size_of::<Seed>() as u64)?,
+            draws: gpu.buffer("seed draws", u64::from(plan.seed_regions) * size_of::<DrawCommand>() as u64)?,
+            quads: gpu.buffer("seed quads", 2 * u64::from(plan.seed_regions) * size_of::<SeedQuad>() as u64)?,
+            visible_quads: Vec::new(),
+            visible: 0,
+            region_capacity: plan.region_capacity,
+            coverage: gpu.image(&ImageDesc {
+                name: "coverage tiles",
+                format: vk::Format::R8G8B8A8_UNORM,
+                size: [plan.coverage_size; 2],
+                layers: plan.seed_regions,
+                levels: 1,
+                samples: 1,
+                usage: vk::ImageUsageFlags::COLOR_ATTACHMENT,
+            })?,
+            pages: gpu.buffer_with("seed pages", &vec![NO_PAGE; (GRID_SIDE * GRID_SIDE) as usize])?,
+            quad_indices: gpu.buffer_with("quad indices", &indices)?,
+            pattern: gpu.buffer_with("point pattern", &pattern)?,
+            listed: gpu.buffer_with("listed trees", &listed)?,
+            species_count: gpu.buffer_with("species count", &[scene.species.len() as u32])?,
+            listed_ranges,
+            cache: SlotCache::new(plan.seed_regions),
+            covered: vec![None; plan.seed_regions as usize],
+            programs: (
+                gpu.compute(&shaders::FOREST_SEEDS_COMP, &[])?,
+                coverage_program(
+                    &shaders::FOREST_EXPECTED_COVERAGE_VERT,
+                    &shaders::FOREST_EXPECTED_COVERAGE_FRAG,
+                    Blend::Replace,
+                    &side,
+                )?,
+                coverage_program(
+                    &shaders::FOREST_COVERAGE_VERT,
+                    &shaders::FOREST_COVERAGE_FRAG,
+                    Blend::Union,
+                    &side[..1],
+                )?,
+            ),
+            parameters: SeedParameters {
+                extent: scene.terrain.extent.map(|e| e as f32),
+                quad_side: plan.quad_side as f32,
+                tile_side: plan.tile_side as f32,
+                cell_size: if heights { scene.terrain.cell_size as f32 } else { plan.quad_side as f32 },
+                pattern_density: plan.pattern_density as f32,
+                seed: scene.seed,
+                region_capacity: plan.region_capacity,
+                tiles_per_side: if plan.pattern.is_some() { plan.tiles_per_quad } else { 0 },
+                points_per_tile: plan.pattern.as_ref().map_or(1, |p| p.max_points()),
+                first_quad: 0,
+                has_heights: u32::from(heights),
+            },
+            quad_count: scene.terrain.extent.map(|e| (e / plan.quad_side).ceil().max(1.0) as i32),
+            top: plan.tallest,
+        })
+    }
+
+    /// The camera's quad and its position in it.
+    pub fn camera_quad(&self, eye: &Eye) -> ([i32; 2], [f64; 2]) {
+        let side = f64::from(self.parameters.quad_side);
+        let quad = [0, 1].map(|k| (eye.position[k] / side).floor());
+        (quad.map(|q| q as i32), [0, 1].map(|k| eye.position[k] - quad[k] * side))
+    }
+
+    /// Selects the quads whose trees this frame may see or that cast into its view, and uploads them.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when the view needs more quads than the plan holds.
+    pub fn update(&mut self, gpu: &Gpu, tree: &Quadtree, eye: &Eye, range: f64, reach: [f64; 3]) -> Result<SeedWork> {
+        self.cache.begin_frame();
+        self.visible = 0;
+        self.visible_quads.clear();
+        let mut work = SeedWork::default();
+        let visible = if range > 0.0 { self.select(tree, eye, range, reach) } else { Vec::new() };
+        let (mut fresh, mut regions) = (Vec::new(), Vec::new());
+        let mut take = |this: &mut Self, quad: (i32, i32)| -> Result<u32> {
+            let slot = this.cache.slot(quad).ok_or_else(|| {
+                Error::Usage(format!(
+                    "this view needs more than the {} seed quads of the plan: raise zfield_min_pixels or memory_mib",
+                    this.cache.capacity()
+                ))
+            })?;
+            if slot.fresh {
+                this.covered[slot.index as usize] = None;
+                fresh.push(this.seed_quad(quad, slot.index, eye));
+            }
+            Ok(slot.index)
+        };
+        for quad in &visible {
+            regions.push(take(self, *quad)?);
+        }
+        // Discs of neighbours reach into a tile: their seeds must be there before it is drawn.
+        let mut tiles = Vec::new();
+        for (k, &(x, y)) in visible.iter().enumerate() {
+            if self.covered[regions[k] as usize] == Some((x, y)) {
+                continue;
+            }
+            let mut around = Vec::new();
+            for (dx, dy) in [(0, 0), (-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
+                let quad = (x + dx, y + dy);
+                if self.exists(quad) {
+                    let side = f64::from(self.parameters.quad_side);
+                    around.push((take(self, quad)?, [f64::from(dx) * side, f64::from(dy) * side]));
+                }
+            }
+            tiles.push((regions[k], (x, y), around));
+        }
+        let mut pages = vec![NO_PAGE; (GRID_SIDE * GRID_SIDE) as usize];
+        let mask = GRID_SIDE as i32 - 1;
+        for (&(x, y), &region) in visible.iter().zip(&regions) {
+            pages[((x & mask) + (y & mask) * GRID_SIDE as i32) as usize] = region;
+            self.visible_quads.push(self.seed_quad((x, y), region, eye));
+        }
+        self.visible = visible.len() as u32;
+        let mut all = self.visible_quads.clone();
+        work.fresh = (all.len() as u32, fresh.len() as u32);
+        all.extend(&fresh);
+        for (region, quad, around) in tiles {
+            let index = visible.iter().position(|q| *q == quad).unwrap_or(0) as u32;
+            self.covered[region as usize] = Some(quad);
+            work.tiles.push((index, region, around));
+        }
+        gpu.upload(&self.quads, 0, &all)?;
+        gpu.upload(&self.pages, 0, &pages)?;
+        Ok(work)
+    }
+
+    fn exists(&self, (x, y): (i32, i32)) -> bool {
+        (0..self.quad_count[0]).contains(&x) && (0..self.quad_count[1]).contains(&y)
+    }
+
+    /// Quads within `range` whose trees, or the trees' shadows (`reach` long, away from the sun), may be in view.
+    fn select(&self, tree: &Quadtree, eye: &Eye, range: f64, reach: [f64; 3]) -> Vec<(i32, i32)> {
+        let side = f64::from(self.parameters.quad_side);
+        let planes = eye.planes();
+        let span = |k: usize| {
+            let low = ((eye.position[k] - range) / side).floor() as i32;
+            let high = ((eye.position[k] + range) / side).floor() as i32;
+            low.max(0)..=high.min(self.quad_count[k] - 1)
+        };
+        let mut found = Vec::new();
+        for y in span(1) {
+            for x in span(0) {
+                let low = [f64::from(x) * side, f64::from(y) * side];
+                let ground = tree.ground_bounds(low, [low[0] + side, low[1] + side]);
+                // Crowns reach out of their quad, and up; shadows reach away from the sun.
+                let margin = self.top;
+                let tall = Bounds {
+                    low: [ground.low[0] - margin, ground.low[1] - margin, ground.low[2]],
+                    high: [ground.high[0] + margin, ground.high[1] + margin, ground.high[2] + self.top],
+                };
+                let swept = Bounds {
+                    low: [0, 1, 2].map(|k| tall.low[k] + reach[k].min(0.0)),
+                    high: [0, 1, 2].map(|k| tall.high[k] + reach[k].max(0.0)),
+                };
+                if tall.distance(eye.position) <= range && swept.touches(&planes, eye.position) {
+                    found.push((x, y));
+                }
+            }
+        }
+        found.sort_unstable_by_key(|(x, y)| (*y, *x));
+        found
+    }
+
+    fn seed_quad(&self, (x, y): (i32, i32), region: u32, eye: &Eye) -> SeedQuad {
+        let p = &self.parameters;
+        let (side, cell) = (f64::from(p.quad_side), f64::from(p.cell_size));
+        let corner = [f64::from(x) * side, f64::from(y) * side];
+        let texel = corner.map(|c| (c / cell).floor());
+        let (camera, _) = self.camera_quad(eye);
+        let (first, count) = self.listed_ranges.get(&(x, y)).copied().unwrap_or((0, 0));
+        SeedQuad {
+            tile: [x, y].map(|v| v * p.tiles_per_side as i32),
+            texel: texel.map(|t| t as i32),
+            texel_offset: [0, 1].map(|k| (corner[k] / cell - texel[k]) as f32),
+            corner: [f64::from(x - camera[0]) * side, f64::from(y - camera[1]) * side].map(|v| v as f32),
+            region,
+            first_position: first,
+            position_count: count,
+            pad: 0,
+        }
+    }
+
+    /// Records the production of fresh seeds and coverage tiles.
+    pub fn produce(&self, recorder: &mut Recorder, work: &SeedWork, terrain: &TerrainData, species: &SpeciesData) {
+        if work.fresh.1 > 0 {
+            recorder.compute("seeds", |pass| {
+                pass.bind(
+                    &self.programs.0,
+                    &[
+                        ("quads", Resource::Buffer(&self.quads)),
+                        ("pattern", Resource::Buffer(&self.pattern)),
+                        ("listed", Resource::Buffer(&self.listed)),
+                        ("species", Resource::Buffer(&species.table)),
+                        ("seeds", Resource::Buffer(&self.seeds)),
+                        ("draws", Resource::Buffer(&self.draws)),
+                        ("heights", Resource::Texture(&terrain.heights, Sampler::Nearest)),
+                        ("densities", Resource::Texture(&species.densities, Sampler::Nearest)),
+                        ("scene_size", Resource::Buffer(&self.species_count)),
+                    ],
+                );
+                pass.push(&SeedParameters { first_quad: work.fresh.0, ..self.parameters });
+                pass.dispatch([work.fresh.1, 1, 1]);
+            });
+        }
+        if work.tiles.is_empty() {
+            return;
+        }
+        let targets = Targets {
+            colors: &[Attachment { image: &self.coverage, resolve: None, clear: None }],
+            depth: None,
+            layers: self.coverage.layers(),
+        };
+        let side = self.parameters.quad_side;
+        recorder.render("coverage tiles", &targets, |pass| {
+            let bound = [
+                ("quads", Resource::Buffer(&self.quads)),
+                ("species", Resource::Buffer(&species.table)),
+                ("heights", Resource::Texture(&terrain.heights, Sampler::Nearest)),
+                ("densities", Resource::Texture(&species.densities, Sampler::Nearest)),
+                ("seeds", Resource::Buffer(&self.seeds)),
+            ];
+            pass.bind(&self.programs.1, &bound);
+            for (quad, layer, _) in &work.tiles {
+                let tile = CoverageTile { layer: *layer, region: *layer, offset: [0.0; 2], side, quad: *quad };
+                pass.push(&ExpectedCoverage { parameters: self.parameters, tile });
+                pass.draw(3, 1);
+            }
+            pass.bind(&self.programs.2, &bound);
+            for (quad, layer, around) in &work.tiles {
+                for (region, offset) in around {
+                    let offset = offset.map(|v| v as f32);
+                    pass.push(&CoverageTile { layer: *layer, region: *region, offset, side, quad: *quad });
+                    let command = u64::from(*region) * size_of::<DrawCommand>() as u64;
+                    pass.draw_indexed_indirect(&self.quad_indices, &self.draws, command);
+                }
+            }
+        });
+    }
+}
+
+/// Listed trees quad by quad, in the order of species and lists, and each quad's first and number.
+fn bin_listed(scene: &Scene, side: f64) -> (Vec<ListedTree>, HashMap<(i32, i32), (u32, u32)>) {
+    let mut all: Vec<((i32, i32), ListedTree)> = Vec::new();
+    for (species, s) in scene.species.iter().enumerate() {
+        let Distribution::Positions(list) = &s.distribution else { continue };
+        for (index, p) in list.iter().enumerate() {
+            // A tree on the far border belongs to the last quad.
+            let quad = [0, 1].map(|k| {
+                let last = (scene.terrain.extent[k] / side).ceil().max(1.0) - 1.0;
+                ([p.x, p.y][k] / side).floor().clamp(0.0, last)
+            });
+            let tree = ListedTree {
+                position: [(p.x - quad[0] * side) as f32, (p.y - quad[1] * side) as f32],
+                scale: p.scale.unwrap_or(0.0),
+                turn: p.rotation.map_or(-1.0, |r| (r / 360.0).rem_euclid(1.0)),
+                species: species as u32,
+                index: index as u32,
+            };
+            all.push(((quad[1] as i32, quad[0] as i32), tree));
+        }
+    }
+    all.sort_by_key(|(quad, _)| *quad);
+    let mut ranges: HashMap<(i32, i32), (u32, u32)> = HashMap::new();
+    for (k, ((y, x), _)) in all.iter().enumerate() {
+        ranges.entry((*x, *y)).or_insert((k as u32, 0)).1 += 1;
+    }
+    (all.into_iter().map(|(_, t)| t).collect(), ranges)
+}
+
+/// Trees of the fullest quad of listed trees.
+pub(crate) fn fullest_listed(scene: &Scene, side: f64) -> u32 {
+    bin_listed(scene, side).1.values().map(|(_, n)| *n).max().unwrap_or(0)
+}

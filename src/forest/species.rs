@@ -1,0 +1,158 @@
+//! Species on the GPU: the table, the z-field views of all species in one array, view bases, masks and density maps.
+
+use std::sync::Arc;
+
+use crate::bake::SpeciesBake;
+use crate::gpu::interface::{NO_PAGE, Species as Row, ViewBasis};
+use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
+use crate::physics::masks::combination_table;
+use crate::physics::views;
+use crate::plan::Plan;
+use crate::scene::{Distribution, Raster, Scene};
+use crate::{Error, Result};
+
+/// Everything about species that shaders read.
+pub struct SpeciesData {
+    /// Rows of the table, also for the CPU's twin of the cull.
+    pub rows: Vec<Row>,
+    /// The table.
+    pub table: Buffer,
+    /// z-field views, species after species.
+    pub views: Image,
+    /// Bases of the views of one species.
+    pub bases: Buffer,
+    /// Combination table of sample masks.
+    pub masks: Buffer,
+    /// Rows of the combination table.
+    pub mask_rows: u32,
+    /// Density maps, one a layer.
+    pub densities: Image,
+}
+
+impl SpeciesData {
+    /// Uploads baked species.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, baked: &[Arc<SpeciesBake>]) -> Result<Self> {
+        let n = scene.settings.view_rings;
+        let view_count = views::view_count(n);
+        let resolution = scene.settings.view_resolution;
+        let texels = gpu.image(&ImageDesc {
+            name: "z-field views",
+            format: vk::Format::R8G8B8A8_UNORM,
+            size: [resolution; 2],
+            layers: (view_count * baked.len() as u32).max(1),
+            levels: resolution.ilog2() + 1,
+            samples: 1,
+            usage: vk::ImageUsageFlags::empty(),
+        })?;
+        for (k, bake) in baked.iter().enumerate() {
+            if bake.views.resolution != resolution || bake.views.n != n {
+                return Err(Error::Usage("a species was baked with other settings than the scene's".into()));
+            }
+            for (level, bytes) in bake.views.levels.iter().enumerate() {
+                gpu.upload_image(&texels, level as u32, k as u32 * view_count, view_count, bytes)?;
+            }
+        }
+        let bases: Vec<ViewBasis> = views::all(n)
+            .iter()
+            .map(|v| {
+                // The one-texel border: u = 1/2 + (p · right) / (2 m), v likewise over the view's vertical extent.
+                let m = f64::from(resolution) / f64::from(resolution - 2);
+                let height = v.direction[2] + v.direction[0].hypot(v.direction[1]);
+                let row = |a: [f64; 3], s: f64| [a[0] * s, a[1] * s, a[2] * s, 0.0].map(|x| x as f32);
+                ViewBasis {
+                    u: row(v.right, 0.5 / m),
+                    v: row(v.up, 0.5 / (height * m)),
+                    depth: row(v.direction, 1.0),
+                }
+            })
+            .collect();
+        let maps: Vec<&Raster> = scene.species.iter().filter_map(density_map).collect();
+        let size = maps.iter().fold([1, 1], |s: [u32; 2], m| [s[0].max(m.width), s[1].max(m.height)]);
+        let densities = gpu.image(&ImageDesc {
+            name: "density maps",
+            format: vk::Format::R32_SFLOAT,
+            size,
+            layers: (maps.len() as u32).max(1),
+            levels: 1,
+            samples: 1,
+            usage: vk::ImageUsageFlags::empty(),
+        })?;
+        for (layer, map) in maps.iter().enumerate() {
+            let mut padded = vec![0f32; (size[0] * size[1]) as usize];
+            for y in 0..map.height as usize {
+                let row = &map.samples[y * map.width as usize..][..map.width as usize];
+                padded[y * size[0] as usize..][..row.len()].copy_from_slice(row);
+            }
+            gpu.upload_image(&densities, 0, layer as u32, 1, bytemuck::cast_slice(&padded))?;
+        }
+        let mut rows = rows(scene, plan, baked, view_count);
+        if rows.is_empty() {
+            rows.push(bytemuck::Zeroable::zeroed());
+        }
+        let masks = combination_table(plan.samples);
+        Ok(SpeciesData {
+            table: gpu.buffer_with("species", &rows)?,
+            rows,
+            views: texels,
+            bases: gpu.buffer_with("view bases", &bases)?,
+            mask_rows: masks.len() as u32,
+            masks: gpu.buffer_with("sample masks", &masks)?,
+            densities,
+        })
+    }
+}
+
+fn density_map(species: &crate::scene::Species) -> Option<&Raster> {
+    match &species.distribution {
+        Distribution::Density { map, .. } => map.as_deref(),
+        Distribution::Positions(_) => None,
+    }
+}
+
+fn rows(scene: &Scene, plan: &Plan, baked: &[Arc<SpeciesBake>], view_count: u32) -> Vec<Row> {
+    let mut next_map = 0;
+    let mut rows = Vec::new();
+    for (k, (species, bake)) in scene.species.iter().zip(baked).enumerate() {
+        let (mut max_density, mut between, mut slope) = (0.0, None, None);
+        if let Distribution::Density { max_density: d, between_heights, below_slope, .. } = &species.distribution
+        {
+            (max_density, between, slope) = (*d, *between_heights, *below_slope);
+        }
+        let density_layer = match density_map(species) {
+            Some(_) => {
+                next_map += 1;
+                next_map - 1
+            }
+            None => NO_PAGE,
+        };
+        let map_size = density_map(species).map_or([1.0; 2], |m| [m.width as f32, m.height as f32]);
+        // Smooth limits: a tenth of the height range, a sixth of the slope.
+        let [low, high] = between.unwrap_or([-1e30, 1e30]);
+        let tangent = slope.map_or(1e30, |s| s.to_radians().tan());
+        rows.push(Row {
+            scale_to_metres: [bake.radius, bake.radius, bake.half_height],
+            centre: bake.center,
+            reflectance: bake.reflectance,
+            extinction: bake.extinction,
+            transmittance: bake.transmittance,
+            range: plan.species_range[k] as f32,
+            height: bake.height,
+            crown_radius: bake.crown_radius,
+            bounding_radius: bake.radius.hypot(bake.half_height),
+            first_layer: k as u32 * view_count,
+            scale_range: species.scale,
+            max_density,
+            density_layer,
+            between_heights: [low, high],
+            below_slope: tangent,
+            height_softness: if between.is_some() { 0.1 * (high - low) } else { 1.0 },
+            map_size,
+            slope_softness: if slope.is_some() { tangent / 6.0 } else { 1.0 },
+            pad: 0,
+        });
+    }
+    rows
+}

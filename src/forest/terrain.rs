@@ -1,0 +1,216 @@
+//! Terrain tiles: heights and slopes of quads in texture arrays, least recently used first out.
+
+use super::cache::SlotCache;
+use super::quadtree::{MIN_REFINE, QuadKey, Quadtree};
+use crate::frame::camera::Eye;
+use crate::frame::cascades::Cascade;
+use crate::gpu::interface::{TERRAIN_CELLS, TERRAIN_HEIGHTS, TERRAIN_SLOPES, TerrainParameters, TerrainQuad};
+use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Program, Recorder, Resource, Sampler, shaders, vk};
+use crate::plan::Plan;
+use crate::scene::{Albedo, Scene};
+use crate::{Error, Result};
+
+/// The ground: its quadtree, height map, tiles and reflectance.
+pub struct TerrainData {
+    /// Which quads at which level.
+    pub tree: Quadtree,
+    /// Height map; one texel for a level plain.
+    pub heights: Image,
+    /// Reflectance.
+    pub albedo: Image,
+    /// Heights of quads.
+    pub height_tiles: Image,
+    /// Slopes of quads.
+    pub slope_tiles: Image,
+    /// Quads of this frame: the camera's, each cascade's, then those to produce.
+    pub quads: Buffer,
+    cache: SlotCache<QuadKey>,
+    program: Program,
+    refine: f64,
+    extent: [f64; 2],
+    has_heights: bool,
+    texels_per_step: f64,
+}
+
+/// Where each draw's quads are in [`TerrainData::quads`].
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TerrainDraws {
+    /// First and number of the camera's quads.
+    pub camera: (u32, u32),
+    /// The same for each cascade.
+    pub cascades: Vec<(u32, u32)>,
+    /// The same for tiles to produce.
+    pub fresh: (u32, u32),
+}
+
+impl TerrainData {
+    /// Uploads the height map and makes the caches.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
+        let terrain = &scene.terrain;
+        let texture = |name, format, size| {
+            gpu.image(&ImageDesc {
+                name,
+                format,
+                size,
+                layers: 1,
+                levels: 1,
+                samples: 1,
+                usage: vk::ImageUsageFlags::empty(),
+            })
+        };
+        let size = terrain.heights.as_ref().map_or([1, 1], |r| [r.width, r.height]);
+        let heights = texture("height map", vk::Format::R32_SFLOAT, size)?;
+        let flat = [0f32];
+        let samples = terrain.heights.as_ref().map_or(&flat[..], |r| &r.samples);
+        gpu.upload_image(&heights, 0, 0, 1, bytemuck::cast_slice(samples))?;
+        let albedo = match &terrain.albedo {
+            Albedo::Uniform([r, g, b]) => {
+                let image = texture("ground albedo", vk::Format::R32G32B32A32_SFLOAT, [1, 1])?;
+                gpu.upload_image(&image, 0, 0, 1, bytemuck::cast_slice(&[*r, *g, *b, 1.0]))?;
+                image
+            }
+            Albedo::Image(t) => {
+                let image = texture("ground albedo", vk::Format::R8G8B8A8_SRGB, [t.width, t.height])?;
+                gpu.upload_image(&image, 0, 0, 1, &t.rgba)?;
+                image
+            }
+        };
+        let tiles = |name, format, side| {
+            gpu.image(&ImageDesc {
+                name,
+                format,
+                size: [side; 2],
+                layers: plan.terrain_tiles,
+                levels: 1,
+                samples: 1,
+                usage: vk::ImageUsageFlags::STORAGE,
+            })
+        };
+        let tree = Quadtree::new(terrain);
+        Ok(TerrainData {
+            heights,
+            albedo,
+            height_tiles: tiles("height tiles", vk::Format::R32_SFLOAT, TERRAIN_HEIGHTS)?,
+            slope_tiles: tiles("slope tiles", vk::Format::R16G16B16A16_SFLOAT, TERRAIN_SLOPES)?,
+            // Each quad once for the camera, once a cascade, once when fresh.
+            quads: gpu.buffer("terrain quads", 6 * u64::from(plan.terrain_tiles) * size_of::<TerrainQuad>() as u64)?,
+            cache: SlotCache::new(plan.terrain_tiles),
+            program: gpu.compute(&shaders::FOREST_TERRAIN_TILE_COMP, &[])?,
+            refine: 0.0,
+            extent: terrain.extent,
+            has_heights: terrain.heights.is_some(),
+            texels_per_step: if terrain.heights.is_some() { tree.step() / terrain.cell_size } else { 0.0 },
+            tree,
+        })
+    }
+
+    /// Push constants of draws and dispatches, from a first quad on.
+    pub fn parameters(&self, first_quad: u32) -> TerrainParameters {
+        TerrainParameters {
+            last: self.extent.map(|e| (e / self.tree.step()) as f32),
+            step: self.tree.step() as f32,
+            texels_per_step: self.texels_per_step as f32,
+            extent: self.extent.map(|e| e as f32),
+            first_quad,
+            has_heights: u32::from(self.has_heights),
+        }
+    }
+
+    /// Selects this frame's quads and uploads them.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when the view needs more tiles than the plan holds even at the coarsest.
+    pub fn update(&mut self, gpu: &Gpu, eye: &Eye, cascades: &[Cascade], pixels: f64) -> Result<TerrainDraws> {
+        let most = self.cache.capacity() as usize;
+        let planes = eye.planes();
+        let wanted = eye.pixels_at_1m / (f64::from(TERRAIN_CELLS) * pixels);
+        let mut refine = wanted.max(MIN_REFINE);
+        loop {
+            self.refine = refine;
+            let tree = &self.tree;
+            let select = |keep: &dyn Fn(&super::quadtree::Bounds) -> bool| {
+                tree.select(eye.position, refine, most, keep)
+            };
+            let camera = select(&|b| b.touches(&planes, eye.position));
+            let shadows: Option<Vec<_>> =
+                cascades.iter().map(|c| select(&|b| b.touches(&c.planes, eye.position))).collect();
+            if let (Some(camera), Some(shadows)) = (camera, shadows)
+                && let Some(draws) = self.assign(gpu, &camera, &shadows)?
+            {
+                return Ok(draws);
+            }
+            if refine <= MIN_REFINE {
+                return Err(Error::Usage(format!(
+                    "this view needs more than the {most} terrain tiles of the plan"
+                )));
+            }
+            // Coarser everywhere rather than holes somewhere.
+            refine = (0.8 * refine).max(MIN_REFINE);
+        }
+    }
+
+    fn assign(
+        &mut self,
+        gpu: &Gpu,
+        camera: &[QuadKey],
+        shadows: &[Vec<QuadKey>],
+    ) -> Result<Option<TerrainDraws>> {
+        self.cache.begin_frame();
+        let (mut all, mut fresh) = (Vec::new(), Vec::new());
+        let mut draws = TerrainDraws::default();
+        for (k, list) in std::iter::once(camera).chain(shadows.iter().map(Vec::as_slice)).enumerate() {
+            let first = all.len() as u32;
+            for key in list {
+                let Some(slot) = self.cache.slot(*key) else {
+                    self.cache = SlotCache::new(self.cache.capacity());
+                    return Ok(None);
+                };
+                let spacing = self.tree.spacing(key.level);
+                let corner = [key.x, key.y].map(|v| (v * TERRAIN_CELLS * spacing) as i32);
+                let quad = TerrainQuad {
+                    corner,
+                    spacing: spacing as i32,
+                    layer: slot.index,
+                    morph: self.tree.morph(key.level, self.refine).map(|m| m as f32),
+                };
+                all.push(quad);
+                if slot.fresh {
+                    fresh.push(quad);
+                }
+            }
+            let range = (first, all.len() as u32 - first);
+            if k == 0 {
+                draws.camera = range;
+            } else {
+                draws.cascades.push(range);
+            }
+        }
+        draws.fresh = (all.len() as u32, fresh.len() as u32);
+        all.extend(fresh);
+        gpu.upload(&self.quads, 0, &all)?;
+        Ok(Some(draws))
+    }
+
+    /// Records the production of fresh tiles.
+    pub fn produce(&self, recorder: &mut Recorder, draws: &TerrainDraws) {
+        if draws.fresh.1 == 0 {
+            return;
+        }
+        recorder.compute("terrain tiles", |pass| {
+            pass.bind(
+                &self.program,
+                &[
+                    ("quads", Resource::Buffer(&self.quads)),
+                    ("heights", Resource::Texture(&self.heights, Sampler::Nearest)),
+                    ("height_tiles", Resource::Storage(&self.height_tiles)),
+                    ("slope_tiles", Resource::Storage(&self.slope_tiles)),
+                ],
+            );
+            pass.push(&self.parameters(draws.fresh.0));
+            pass.dispatch([(TERRAIN_SLOPES * TERRAIN_SLOPES).div_ceil(64), draws.fresh.1, 1]);
+        });
+    }
+}

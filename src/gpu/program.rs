@@ -1,0 +1,319 @@
+//! Pipelines with layouts from reflection, and the fixed set of samplers.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::context::{Gpu, Shared, device_error};
+use super::memory::Retired;
+use super::{Binding, Shader};
+use crate::{Error, Result};
+
+/// How a texture is sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sampler {
+    /// No filtering; clamps to the edge.
+    Nearest,
+    /// Bilinear within the nearest mip level; clamps to the edge.
+    Linear,
+    /// Bilinear within the nearest mip level; transparent black outside.
+    LinearBorder,
+    /// Bilinear within the nearest mip level; repeats.
+    LinearRepeat,
+}
+
+impl Sampler {
+    pub(super) const ALL: [Sampler; 4] =
+        [Sampler::Nearest, Sampler::Linear, Sampler::LinearBorder, Sampler::LinearRepeat];
+}
+
+pub(super) fn make_samplers(device: &ash::Device) -> Result<Vec<vk::Sampler>> {
+    let make = |s: &Sampler| {
+        let filter = if *s == Sampler::Nearest { vk::Filter::NEAREST } else { vk::Filter::LINEAR };
+        let address = match s {
+            Sampler::LinearBorder => vk::SamplerAddressMode::CLAMP_TO_BORDER,
+            Sampler::LinearRepeat => vk::SamplerAddressMode::REPEAT,
+            _ => vk::SamplerAddressMode::CLAMP_TO_EDGE,
+        };
+        let create = vk::SamplerCreateInfo::default()
+            .mag_filter(filter)
+            .min_filter(filter)
+            .mipmap_mode(vk::SamplerMipmapMode::NEAREST)
+            .address_mode_u(address)
+            .address_mode_v(address)
+            .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+            .max_lod(vk::LOD_CLAMP_NONE)
+            .border_color(vk::BorderColor::FLOAT_TRANSPARENT_BLACK);
+        // SAFETY: the device is alive.
+        unsafe { device.create_sampler(&create, None) }.map_err(device_error("sampler"))
+    };
+    Sampler::ALL.iter().map(make).collect()
+}
+
+/// A pipeline and what binding to it needs.
+pub struct Program {
+    shared: Arc<Shared>,
+    name: &'static str,
+    pub(super) pipeline: vk::Pipeline,
+    pub(super) layout: vk::PipelineLayout,
+    set: vk::DescriptorSetLayout,
+    pub(super) bindings: Vec<Binding>,
+    pub(super) stages: vk::ShaderStageFlags,
+    pub(super) push_bytes: u32,
+    pub(super) bind_point: vk::PipelineBindPoint,
+}
+
+/// How depth is tested.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthTest {
+    /// No depth buffer.
+    None,
+    /// Nearer wins; reverse Z, so nearer is greater. Writes depth.
+    Reverse,
+}
+
+/// How colours combine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blend {
+    /// The new value replaces the old.
+    Replace,
+    /// Union of coverages: s + d − s d.
+    Union,
+}
+
+/// What the vertices make.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Topology {
+    /// Separate triangles.
+    Triangles,
+}
+
+/// A graphics pipeline.
+#[derive(Clone, Copy, Debug)]
+pub struct GraphicsDesc<'a> {
+    /// Vertex shader.
+    pub vert: &'static Shader,
+    /// Fragment shader.
+    pub frag: &'static Shader,
+    /// Colour attachment formats.
+    pub colors: &'a [vk::Format],
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Depth test; the depth buffer is D32.
+    pub depth: DepthTest,
+    /// Blending, for every colour attachment.
+    pub blend: Blend,
+    /// Primitives.
+    pub topology: Topology,
+    /// Specialization constants: (id, value).
+    pub constants: &'a [(u32, u32)],
+}
+
+impl Gpu {
+    /// A compute pipeline with 32-bit specialization constants (id, value).
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the driver refuses it.
+    pub fn compute(&self, shader: &'static Shader, constants: &[(u32, u32)]) -> Result<Program> {
+        let mut program = self.layouts(&[shader], vk::PipelineBindPoint::COMPUTE)?;
+        let module = Module::new(&self.shared, shader)?;
+        let (entries, data) = specialization(constants);
+        let special = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
+        let stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(shader.stage)
+            .module(module.handle)
+            .name(c"main")
+            .specialization_info(&special);
+        let create = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(program.layout)];
+        // SAFETY: module and layout are alive.
+        let made =
+            unsafe { self.shared.device.create_compute_pipelines(vk::PipelineCache::null(), &create, None) };
+        program.pipeline = made.map_err(|(_, e)| e).map_err(device_error(shader.name))?[0];
+        self.shared.name(program.pipeline, shader.name);
+        Ok(program)
+    }
+
+    /// A graphics pipeline.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the driver refuses it.
+    pub fn graphics(&self, d: &GraphicsDesc) -> Result<Program> {
+        let mut program = self.layouts(&[d.vert, d.frag], vk::PipelineBindPoint::GRAPHICS)?;
+        let (vert, frag) = (Module::new(&self.shared, d.vert)?, Module::new(&self.shared, d.frag)?);
+        let (entries, data) = specialization(d.constants);
+        let special = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
+        let stages = [(d.vert, &vert), (d.frag, &frag)].map(|(s, m)| {
+            vk::PipelineShaderStageCreateInfo::default()
+                .stage(s.stage)
+                .module(m.handle)
+                .name(c"main")
+                .specialization_info(&special)
+        });
+        let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
+        let Topology::Triangles = d.topology;
+        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
+            .topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+        let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+        let raster = vk::PipelineRasterizationStateCreateInfo::default()
+            .polygon_mode(vk::PolygonMode::FILL)
+            .cull_mode(vk::CullModeFlags::NONE)
+            .line_width(1.0);
+        let multisample = vk::PipelineMultisampleStateCreateInfo::default()
+            .rasterization_samples(vk::SampleCountFlags::from_raw(d.samples));
+        let depth_on = d.depth == DepthTest::Reverse;
+        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+            .depth_test_enable(depth_on)
+            .depth_write_enable(depth_on)
+            .depth_compare_op(vk::CompareOp::GREATER_OR_EQUAL);
+        let attachment = vk::PipelineColorBlendAttachmentState::default()
+            .color_write_mask(vk::ColorComponentFlags::RGBA)
+            .blend_enable(d.blend == Blend::Union)
+            .src_color_blend_factor(vk::BlendFactor::ONE)
+            .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_COLOR)
+            .src_alpha_blend_factor(vk::BlendFactor::ONE)
+            .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
+        let attachments = vec![attachment; d.colors.len()];
+        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
+        let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
+        let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(d.colors);
+        if depth_on {
+            rendering = rendering.depth_attachment_format(vk::Format::D32_SFLOAT);
+        }
+        let create = [vk::GraphicsPipelineCreateInfo::default()
+            .stages(&stages)
+            .vertex_input_state(&vertex_input)
+            .input_assembly_state(&assembly)
+            .viewport_state(&viewport)
+            .rasterization_state(&raster)
+            .multisample_state(&multisample)
+            .depth_stencil_state(&depth)
+            .color_blend_state(&blend)
+            .dynamic_state(&dynamic)
+            .layout(program.layout)
+            .push_next(&mut rendering)];
+        // SAFETY: modules, layout and every state struct are alive.
+        let made = unsafe {
+            self.shared.device.create_graphics_pipelines(vk::PipelineCache::null(), &create, None)
+        };
+        program.pipeline = made.map_err(|(_, e)| e).map_err(device_error(d.frag.name))?[0];
+        self.shared.name(program.pipeline, d.frag.name);
+        Ok(program)
+    }
+
+    /// Descriptor set and pipeline layouts of these stages together; the pipeline is still null.
+    fn layouts(&self, stages: &[&'static Shader], bind_point: vk::PipelineBindPoint) -> Result<Program> {
+        let s = &self.shared;
+        let mut bindings: Vec<(Binding, vk::ShaderStageFlags)> = Vec::new();
+        for shader in stages {
+            for b in shader.bindings {
+                match bindings.iter_mut().find(|(known, _)| known.binding == b.binding) {
+                    Some((known, flags)) if known.name == b.name && known.kind == b.kind => {
+                        *flags |= shader.stage;
+                    }
+                    Some((known, _)) => {
+                        return Err(Error::Usage(format!(
+                            "{}: binding {} is \"{}\" here and \"{}\" in another stage",
+                            shader.name, b.binding, b.name, known.name
+                        )));
+                    }
+                    None => bindings.push((*b, shader.stage)),
+                }
+            }
+        }
+        let layout: Vec<_> = bindings
+            .iter()
+            .map(|(b, flags)| {
+                vk::DescriptorSetLayoutBinding::default()
+                    .binding(b.binding)
+                    .descriptor_type(b.kind)
+                    .descriptor_count(1)
+                    .stage_flags(*flags)
+            })
+            .collect();
+        let stage_flags = stages.iter().fold(vk::ShaderStageFlags::empty(), |f, s| f | s.stage);
+        let push_bytes = stages.iter().map(|s| s.push_constant_bytes).max().unwrap_or(0);
+        let ranges =
+            [vk::PushConstantRange::default().stage_flags(stage_flags).offset(0).size(push_bytes)];
+        // SAFETY: the device is alive; the set layout outlives the pipeline layout.
+        unsafe {
+            let set = s
+                .device
+                .create_descriptor_set_layout(
+                    &vk::DescriptorSetLayoutCreateInfo::default()
+                        .flags(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
+                        .bindings(&layout),
+                    None,
+                )
+                .map_err(device_error("descriptor set layout"))?;
+            let sets = [set];
+            let mut create = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
+            if push_bytes > 0 {
+                create = create.push_constant_ranges(&ranges);
+            }
+            let layout = match s.device.create_pipeline_layout(&create, None) {
+                Ok(l) => l,
+                Err(e) => {
+                    s.device.destroy_descriptor_set_layout(set, None);
+                    return Err(device_error("pipeline layout")(e));
+                }
+            };
+            Ok(Program {
+                shared: s.clone(),
+                name: stages[stages.len() - 1].name,
+                pipeline: vk::Pipeline::null(),
+                layout,
+                set,
+                bindings: bindings.into_iter().map(|(b, _)| b).collect(),
+                stages: stage_flags,
+                push_bytes,
+                bind_point,
+            })
+        }
+    }
+}
+
+impl Program {
+    /// Path of its last stage under `shaders/`.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        self.shared.retire(Retired::Program(self.pipeline, self.layout, self.set));
+    }
+}
+
+/// A shader module for the time of making a pipeline.
+struct Module<'a> {
+    shared: &'a Shared,
+    handle: vk::ShaderModule,
+}
+
+impl<'a> Module<'a> {
+    fn new(shared: &'a Shared, shader: &Shader) -> Result<Self> {
+        let words = bytemuck::pod_collect_to_vec::<u8, u32>(shader.spirv);
+        let create = vk::ShaderModuleCreateInfo::default().code(&words);
+        // SAFETY: the words are SPIR-V from glslang.
+        let handle = unsafe { shared.device.create_shader_module(&create, None) };
+        Ok(Module { shared, handle: handle.map_err(device_error(shader.name))? })
+    }
+}
+
+impl Drop for Module<'_> {
+    fn drop(&mut self) {
+        // SAFETY: a module is not used once its pipeline is made.
+        unsafe { self.shared.device.destroy_shader_module(self.handle, None) };
+    }
+}
+
+fn specialization(constants: &[(u32, u32)]) -> (Vec<vk::SpecializationMapEntry>, Vec<u8>) {
+    let entries = constants.iter().enumerate().map(|(k, (id, _))| vk::SpecializationMapEntry {
+        constant_id: *id,
+        offset: 4 * k as u32,
+        size: 4,
+    });
+    (entries.collect(), constants.iter().flat_map(|(_, v)| v.to_ne_bytes()).collect())
+}

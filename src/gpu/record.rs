@@ -1,0 +1,465 @@
+//! Recording a frame: a pass is a label, a pair of timestamps and the barriers around its work.
+
+use std::sync::atomic::Ordering;
+
+use ash::vk;
+use bytemuck::Pod;
+
+use super::context::{Gpu, device_error};
+use super::memory::{Buffer, Image};
+use super::program::{Program, Sampler};
+use crate::{Error, Result};
+
+/// Most passes in one recording.
+const MAX_PASSES: u32 = 256;
+
+/// GPU time of one pass.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct PassTime {
+    /// Name of the pass.
+    pub name: String,
+    /// Milliseconds between its two timestamps.
+    pub gpu_ms: f64,
+}
+
+/// What a shader binding gets.
+#[derive(Clone, Copy)]
+pub enum Resource<'a> {
+    /// A storage or uniform buffer, whole.
+    Buffer(&'a Buffer),
+    /// A sampled image.
+    Texture(&'a Image, Sampler),
+    /// A storage image, level 0.
+    Storage(&'a Image),
+}
+
+/// A colour or depth attachment.
+#[derive(Clone, Copy)]
+pub struct Attachment<'a> {
+    /// The image drawn to.
+    pub image: &'a Image,
+    /// Single-sample image that gets the average (or, for integers and depth, sample 0).
+    pub resolve: Option<&'a Image>,
+    /// Value to start from; `None` keeps the content.
+    pub clear: Option<[f32; 4]>,
+}
+
+/// What a render pass draws to.
+#[derive(Clone, Copy)]
+pub struct Targets<'a> {
+    /// Colour attachments.
+    pub colors: &'a [Attachment<'a>],
+    /// Depth attachment.
+    pub depth: Option<Attachment<'a>>,
+    /// First layer drawn to, when `layers` is 1; images with more are drawn whole.
+    pub layers: u32,
+}
+
+/// Records commands for one submission.
+pub struct Recorder<'g> {
+    gpu: &'g Gpu,
+    cmd: vk::CommandBuffer,
+    queries: vk::QueryPool,
+    passes: Vec<String>,
+    error: Option<Error>,
+}
+
+/// A full memory barrier: everything before is visible to everything after.
+pub(super) fn barrier(device: &ash::Device, cmd: vk::CommandBuffer) {
+    let all = [vk::MemoryBarrier2::default()
+        .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+        .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+        .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS | vk::PipelineStageFlags2::HOST)
+        .dst_access_mask(
+            vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE | vk::AccessFlags2::HOST_READ,
+        )];
+    // SAFETY: the command buffer is being recorded.
+    unsafe { device.cmd_pipeline_barrier2(cmd, &vk::DependencyInfo::default().memory_barriers(&all)) };
+}
+
+impl Gpu {
+    /// Starts recording.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when out of memory.
+    pub fn record(&self) -> Result<Recorder<'_>> {
+        let s = &self.shared;
+        let pool = vk::QueryPoolCreateInfo::default()
+            .query_type(vk::QueryType::TIMESTAMP)
+            .query_count(2 * MAX_PASSES);
+        let allocate = vk::CommandBufferAllocateInfo::default()
+            .command_pool(s.pool)
+            .level(vk::CommandBufferLevel::PRIMARY)
+            .command_buffer_count(1);
+        // SAFETY: the pool is used by this thread only while the recorder borrows the Gpu; `Drop` frees both.
+        unsafe {
+            let queries = s.device.create_query_pool(&pool, None).map_err(device_error("timestamps"))?;
+            let cmd = s.device.allocate_command_buffers(&allocate);
+            let cmd = cmd.map_err(device_error("command buffer"))?[0];
+            let recorder = Recorder { gpu: self, cmd, queries, passes: Vec::new(), error: None };
+            let begin = vk::CommandBufferBeginInfo::default()
+                .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+            s.device.begin_command_buffer(cmd, &begin).map_err(device_error("recording"))?;
+            s.device.cmd_reset_query_pool(cmd, queries, 0, 2 * MAX_PASSES);
+            Ok(recorder)
+        }
+    }
+
+    /// Submits one command buffer and waits for it; then frees what was retired before.
+    pub(super) fn submit(&self, cmd: vk::CommandBuffer) -> Result<()> {
+        let s = &self.shared;
+        let value = s.submitted.fetch_add(1, Ordering::AcqRel) + 1;
+        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(cmd)];
+        let signal = [vk::SemaphoreSubmitInfo::default()
+            .semaphore(s.timeline)
+            .value(value)
+            .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
+        let submit =
+            [vk::SubmitInfo2::default().command_buffer_infos(&commands).signal_semaphore_infos(&signal)];
+        let (semaphores, values) = ([s.timeline], [value]);
+        let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        // SAFETY: the command buffer is complete and its resources are alive until the wait returns.
+        unsafe {
+            s.device.queue_submit2(s.queue, &submit, vk::Fence::null()).map_err(device_error("submit"))?;
+            s.device.wait_semaphores(&wait, u64::MAX).map_err(device_error("waiting for the device"))?;
+        }
+        s.collect(value);
+        Ok(())
+    }
+}
+
+impl<'g> Recorder<'g> {
+    fn device(&self) -> &'g ash::Device {
+        &self.gpu.shared.device
+    }
+
+    fn pass(&mut self, name: &str, work: impl FnOnce(&mut Self)) {
+        let index = self.passes.len() as u32;
+        if index >= MAX_PASSES {
+            self.error.get_or_insert(Error::Usage(format!("more than {MAX_PASSES} passes in a frame")));
+            return;
+        }
+        self.passes.push(name.to_string());
+        let (device, cmd, queries) = (self.device(), self.cmd, self.queries);
+        let names = self.gpu.shared.names.as_ref();
+        let stamp = |query| {
+            // SAFETY: the command buffer is being recorded; the query was reset. A barrier follows because
+            // lavapipe may otherwise run the stamp after the work that it precedes.
+            unsafe {
+                let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
+                device.cmd_write_timestamp2(cmd, stage, queries, query);
+            }
+            barrier(device, cmd);
+        };
+        if let (Some(names), Ok(text)) = (names, std::ffi::CString::new(name)) {
+            // SAFETY: the command buffer is being recorded.
+            unsafe {
+                names.cmd_begin_debug_utils_label(cmd, &vk::DebugUtilsLabelEXT::default().label_name(&text))
+            };
+        }
+        stamp(2 * index);
+        work(self);
+        barrier(device, cmd);
+        stamp(2 * index + 1);
+        if let Some(names) = names {
+            // SAFETY: the label was begun above.
+            unsafe { names.cmd_end_debug_utils_label(cmd) };
+        }
+    }
+
+    /// A pass of compute work.
+    pub fn compute(&mut self, name: &str, work: impl FnOnce(&mut ComputePass)) {
+        self.pass(name, |r| work(&mut ComputePass { work: Work { recorder: r, program: None } }));
+    }
+
+    /// A pass that draws to `targets`.
+    pub fn render(&mut self, name: &str, targets: &Targets, work: impl FnOnce(&mut RenderPass)) {
+        let Some(first) = targets.colors.first().or(targets.depth.as_ref()) else {
+            self.error.get_or_insert(Error::Usage(format!("pass {name} draws to nothing")));
+            return;
+        };
+        let [width, height] = first.image.size();
+        let info = |a: &Attachment, depth: bool| {
+            let mut info = vk::RenderingAttachmentInfo::default()
+                .image_view(a.image.view)
+                .image_layout(vk::ImageLayout::GENERAL)
+                .store_op(vk::AttachmentStoreOp::STORE)
+                .load_op(vk::AttachmentLoadOp::LOAD);
+            if let Some(c) = a.clear {
+                let value = if depth {
+                    vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: c[0], stencil: 0 } }
+                } else if is_uint(a.image.format()) {
+                    vk::ClearValue { color: vk::ClearColorValue { uint32: c.map(|v| v as u32) } }
+                } else {
+                    vk::ClearValue { color: vk::ClearColorValue { float32: c } }
+                };
+                info = info.load_op(vk::AttachmentLoadOp::CLEAR).clear_value(value);
+            }
+            if let Some(r) = a.resolve {
+                let average = !depth && !is_uint(a.image.format());
+                info = info
+                    .resolve_image_view(r.view)
+                    .resolve_image_layout(vk::ImageLayout::GENERAL)
+                    .resolve_mode(if average {
+                        vk::ResolveModeFlags::AVERAGE
+                    } else {
+                        vk::ResolveModeFlags::SAMPLE_ZERO
+                    });
+            }
+            info
+        };
+        let colors: Vec<_> = targets.colors.iter().map(|a| info(a, false)).collect();
+        let depth = targets.depth.as_ref().map(|a| info(a, true));
+        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
+        let mut begin = vk::RenderingInfo::default()
+            .render_area(area)
+            .layer_count(targets.layers)
+            .color_attachments(&colors);
+        if let Some(d) = &depth {
+            begin = begin.depth_attachment(d);
+        }
+        let viewport = [vk::Viewport {
+            x: 0.0,
+            y: 0.0,
+            width: width as f32,
+            height: height as f32,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        }];
+        self.pass(name, |r| {
+            let (device, cmd) = (r.device(), r.cmd);
+            // SAFETY: the attachments are alive, in GENERAL layout, and not otherwise used in this pass.
+            unsafe {
+                device.cmd_begin_rendering(cmd, &begin);
+                device.cmd_set_viewport(cmd, 0, &viewport);
+                device.cmd_set_scissor(cmd, 0, &[area]);
+            }
+            work(&mut RenderPass { work: Work { recorder: r, program: None } });
+            // SAFETY: rendering was begun above.
+            unsafe { device.cmd_end_rendering(cmd) };
+        });
+    }
+
+    /// A pass of copies: clears a buffer range to a 32-bit word.
+    pub fn fill(&mut self, name: &str, buffer: &Buffer, word: u32) {
+        self.pass(name, |r| {
+            // SAFETY: the buffer is alive.
+            unsafe { r.device().cmd_fill_buffer(r.cmd, buffer.handle, 0, vk::WHOLE_SIZE, word) };
+        });
+    }
+
+    /// Submits, waits, and returns the GPU time of every pass in order.
+    ///
+    /// # Errors
+    /// What went wrong while recording, or [`Error::Device`].
+    pub fn submit(mut self) -> Result<Vec<PassTime>> {
+        if let Some(e) = self.error.take() {
+            return Err(e);
+        }
+        let s = &self.gpu.shared;
+        // SAFETY: every pass is closed.
+        unsafe { s.device.end_command_buffer(self.cmd) }.map_err(device_error("recording"))?;
+        self.gpu.submit(self.cmd)?;
+        let mut ticks = vec![0u64; 2 * self.passes.len()];
+        if !ticks.is_empty() {
+            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+            // SAFETY: the submission that wrote the queries is complete.
+            unsafe { s.device.get_query_pool_results(self.queries, 0, &mut ticks, flags) }
+                .map_err(device_error("timestamps"))?;
+        }
+        let ns = f64::from(s.info.timestamp_ns);
+        let times = self.passes.iter().zip(ticks.chunks_exact(2)).map(|(name, t)| PassTime {
+            name: name.clone(),
+            gpu_ms: t[1].saturating_sub(t[0]) as f64 * ns * 1e-6,
+        });
+        Ok(times.collect())
+    }
+}
+
+impl Drop for Recorder<'_> {
+    fn drop(&mut self) {
+        let s = &self.gpu.shared;
+        // SAFETY: the command buffer is either never submitted or already waited for.
+        unsafe {
+            s.device.free_command_buffers(s.pool, &[self.cmd]);
+            s.device.destroy_query_pool(self.queries, None);
+        }
+    }
+}
+
+/// What compute and render passes share: programs, bindings and push constants.
+pub struct Work<'r, 'g> {
+    recorder: &'r mut Recorder<'g>,
+    program: Option<(vk::PipelineLayout, vk::ShaderStageFlags, u32)>,
+}
+
+impl Work<'_, '_> {
+    /// Uses a program with its resources by name; every binding of the program must be named.
+    pub fn bind(&mut self, program: &Program, resources: &[(&str, Resource)]) {
+        let s = &self.recorder.gpu.shared;
+        let mut buffers = Vec::with_capacity(program.bindings.len());
+        let mut images = Vec::with_capacity(program.bindings.len());
+        for b in &program.bindings {
+            let found = resources.iter().find(|(name, _)| *name == b.name).map(|(_, r)| *r);
+            let (mut buffer, mut image) =
+                (vk::DescriptorBufferInfo::default(), vk::DescriptorImageInfo::default());
+            let fits = match (found, b.kind) {
+                (
+                    Some(Resource::Buffer(r)),
+                    vk::DescriptorType::STORAGE_BUFFER | vk::DescriptorType::UNIFORM_BUFFER,
+                ) => {
+                    buffer = buffer.buffer(r.handle).range(vk::WHOLE_SIZE);
+                    true
+                }
+                (Some(Resource::Texture(r, sampler)), vk::DescriptorType::COMBINED_IMAGE_SAMPLER) => {
+                    image = image
+                        .image_view(r.view)
+                        .image_layout(vk::ImageLayout::GENERAL)
+                        .sampler(s.samplers[sampler as usize]);
+                    true
+                }
+                (Some(Resource::Storage(r)), vk::DescriptorType::STORAGE_IMAGE) => {
+                    image = image.image_view(r.view).image_layout(vk::ImageLayout::GENERAL);
+                    true
+                }
+                _ => false,
+            };
+            if !fits {
+                let e = format!("{}: \"{}\" wants a {:?}", program.name(), b.name, b.kind);
+                self.recorder.error.get_or_insert(Error::Usage(e));
+                return;
+            }
+            buffers.push([buffer]);
+            images.push([image]);
+        }
+        let writes: Vec<_> = program
+            .bindings
+            .iter()
+            .zip(buffers.iter().zip(&images))
+            .map(|(b, (buffer, image))| {
+                let write =
+                    vk::WriteDescriptorSet::default().dst_binding(b.binding).descriptor_type(b.kind);
+                if buffer[0].buffer == vk::Buffer::null() {
+                    write.image_info(image)
+                } else {
+                    write.buffer_info(buffer)
+                }
+            })
+            .collect();
+        // SAFETY: program and resources are alive until the submission is waited for: the caller owns them and
+        // dropping only retires them.
+        unsafe {
+            s.device.cmd_bind_pipeline(self.recorder.cmd, program.bind_point, program.pipeline);
+            if !writes.is_empty() {
+                let (cmd, layout) = (self.recorder.cmd, program.layout);
+                s.push.cmd_push_descriptor_set(cmd, program.bind_point, layout, 0, &writes);
+            }
+        }
+        self.program = Some((program.layout, program.stages, program.push_bytes));
+    }
+
+    /// Sets the bound program's push constants.
+    pub fn push<T: Pod>(&mut self, constants: &T) {
+        let bytes = bytemuck::bytes_of(constants);
+        match self.program {
+            Some((layout, stages, expected)) if expected as usize == bytes.len() => {
+                // SAFETY: the layout is that of the bound program and takes exactly these bytes.
+                unsafe {
+                    let cmd = self.recorder.cmd;
+                    self.recorder.device().cmd_push_constants(cmd, layout, stages, 0, bytes);
+                }
+            }
+            other => {
+                let e = format!("push constants of {} bytes for {other:?}", bytes.len());
+                self.recorder.error.get_or_insert(Error::Usage(e));
+            }
+        }
+    }
+}
+
+/// Inside a compute pass.
+pub struct ComputePass<'r, 'g> {
+    work: Work<'r, 'g>,
+}
+
+/// Inside a render pass.
+pub struct RenderPass<'r, 'g> {
+    work: Work<'r, 'g>,
+}
+
+impl<'r, 'g> std::ops::Deref for ComputePass<'r, 'g> {
+    type Target = Work<'r, 'g>;
+    fn deref(&self) -> &Self::Target {
+        &self.work
+    }
+}
+
+impl std::ops::DerefMut for ComputePass<'_, '_> {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.work
+    }
+}
+
+impl<'r, 'g> std::ops::Deref for RenderPass<'r, 'g> {
+    type Target = Work<'r, 'g>;
+    fn deref(&self) -> &Self::Target {
+        &self.work
+    }
+}
+
+impl std::ops::DerefMut for RenderPass<'_, '_> {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.work
+    }
+}
+
+impl ComputePass<'_, '_> {
+    /// Runs `groups` workgroups of the bound program.
+    pub fn dispatch(&mut self, groups: [u32; 3]) {
+        if groups.contains(&0) {
+            return;
+        }
+        let r = &*self.work.recorder;
+        // SAFETY: a program and its resources are bound.
+        unsafe { r.device().cmd_dispatch(r.cmd, groups[0], groups[1], groups[2]) };
+    }
+
+    /// A barrier between two dispatches of the same pass.
+    pub fn barrier(&mut self) {
+        let r = &*self.work.recorder;
+        barrier(r.device(), r.cmd);
+    }
+}
+
+impl RenderPass<'_, '_> {
+    /// Draws `vertices` vertices without an index buffer.
+    pub fn draw(&mut self, vertices: u32, instances: u32) {
+        let r = &*self.work.recorder;
+        // SAFETY: a program and its resources are bound.
+        unsafe { r.device().cmd_draw(r.cmd, vertices, instances, 0, 0) };
+    }
+
+    /// Draws with 32-bit indices; the arguments are the command at byte `offset` of `commands`.
+    pub fn draw_indexed_indirect(&mut self, indices: &Buffer, commands: &Buffer, offset: u64) {
+        let r = &*self.work.recorder;
+        // SAFETY: both buffers are alive and hold what the shader that wrote them put there.
+        unsafe {
+            r.device().cmd_bind_index_buffer(r.cmd, indices.handle, 0, vk::IndexType::UINT32);
+            r.device().cmd_draw_indexed_indirect(r.cmd, commands.handle, offset, 1, 20);
+        }
+    }
+
+    /// Draws `count` 32-bit indices.
+    pub fn draw_indexed(&mut self, indices: &Buffer, count: u32, instances: u32) {
+        let r = &*self.work.recorder;
+        // SAFETY: the buffer is alive and holds `count` indices.
+        unsafe {
+            r.device().cmd_bind_index_buffer(r.cmd, indices.handle, 0, vk::IndexType::UINT32);
+            r.device().cmd_draw_indexed(r.cmd, count, instances, 0, 0, 0);
+        }
+    }
+}
+
+fn is_uint(format: vk::Format) -> bool {
+    matches!(format, vk::Format::R32_UINT | vk::Format::R8_UINT)
+}

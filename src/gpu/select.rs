@@ -1,0 +1,185 @@
+//! Which Vulkan device to use, and why the others do not fit.
+
+use std::ffi::CStr;
+
+use ash::vk;
+
+use super::context::load_entry;
+use crate::{Error, Result};
+
+/// What a device is and can do, as far as it matters here.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct DeviceInfo {
+    /// Marketing name.
+    pub name: String,
+    /// Device UUID in hexadecimal, for `--device`.
+    pub uuid: String,
+    /// Kind: `cpu`, `integrated`, `discrete`, `virtual` or `other`.
+    pub kind: &'static str,
+    /// Driver name and version as the driver states them.
+    pub driver: String,
+    /// Vulkan version, `major.minor.patch`.
+    pub api: String,
+    /// Largest side of a 2D image, texels.
+    pub max_image_side: u32,
+    /// Most layers of an image array.
+    pub max_layers: u32,
+    /// Largest storage buffer, bytes.
+    pub max_storage_bytes: u64,
+    /// Sum of the device-local heaps, bytes.
+    pub device_bytes: u64,
+    /// Sample counts that colour and depth both take, as a bit mask (1 | 4 | 8 …).
+    pub sample_counts: u32,
+    /// Nanoseconds a timestamp tick.
+    pub timestamp_ns: f32,
+    /// Why canopy cannot use it; empty if it can.
+    pub missing: Vec<String>,
+}
+
+/// Every Vulkan device of this machine, fit or not.
+///
+/// # Errors
+/// [`Error::NoDevice`] if there is no Vulkan loader or the instance cannot be made.
+pub fn devices() -> Result<Vec<DeviceInfo>> {
+    let entry = load_entry()?;
+    let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+    let create = vk::InstanceCreateInfo::default().application_info(&app);
+    // SAFETY: `create` and what it points to live through the call.
+    let instance = unsafe { entry.create_instance(&create, None) }
+        .map_err(|e| Error::NoDevice(format!("no Vulkan instance: {e}")))?;
+    let found = all(&instance);
+    // SAFETY: nothing made from the instance is alive.
+    unsafe { instance.destroy_instance(None) };
+    Ok(found?.into_iter().map(|(_, info)| info).collect())
+}
+
+fn all(instance: &ash::Instance) -> Result<Vec<(vk::PhysicalDevice, DeviceInfo)>> {
+    // SAFETY: the instance is alive.
+    let physical = unsafe { instance.enumerate_physical_devices() }
+        .map_err(|e| Error::NoDevice(format!("cannot list Vulkan devices: {e}")))?;
+    Ok(physical.into_iter().map(|p| (p, describe(instance, p))).collect())
+}
+
+/// The device that `wanted` names (UUID or part of the name), or else the best that fits: GPUs before CPUs.
+pub(super) fn choose(
+    instance: &ash::Instance,
+    wanted: Option<&str>,
+) -> Result<(vk::PhysicalDevice, DeviceInfo)> {
+    let all = all(instance)?;
+    if all.is_empty() {
+        return Err(Error::NoDevice(
+            "no Vulkan device: install a driver (on Debian: apt-get install mesa-vulkan-drivers)".into(),
+        ));
+    }
+    let simplified = |s: &str| s.to_lowercase().replace('-', "");
+    let named = |i: &DeviceInfo| {
+        wanted.is_none_or(|w| {
+            simplified(&i.uuid) == simplified(w) || i.name.to_lowercase().contains(&w.to_lowercase())
+        })
+    };
+    let rank = |i: &DeviceInfo| match i.kind {
+        "discrete" => 0,
+        "integrated" => 1,
+        "virtual" => 2,
+        _ => 3,
+    };
+    let best = all.iter().filter(|(_, i)| named(i) && i.missing.is_empty()).min_by_key(|(_, i)| rank(i));
+    best.cloned().ok_or_else(|| {
+        let mut text = match wanted {
+            Some(w) => format!("no Vulkan device fits --device {w}:"),
+            None => "no Vulkan device fits:".to_string(),
+        };
+        for (_, i) in &all {
+            let reason = if i.missing.is_empty() {
+                "is not the one named".to_string()
+            } else {
+                format!("lacks {}", i.missing.join(", "))
+            };
+            text += &format!("\n  {} ({}): {reason}", i.name, i.uuid);
+        }
+        Error::NoDevice(text)
+    })
+}
+
+fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
+    // SAFETY: the instance and device are alive; each chain is built of fresh structs.
+    let (base, memory, families, extensions) = unsafe {
+        (
+            instance.get_physical_device_properties(p),
+            instance.get_physical_device_memory_properties(p),
+            instance.get_physical_device_queue_family_properties(p),
+            instance.enumerate_device_extension_properties(p).unwrap_or_default(),
+        )
+    };
+    let text = |c: &[std::ffi::c_char]| {
+        let bytes: Vec<u8> = c.iter().take_while(|b| **b != 0).map(|b| *b as u8).collect();
+        String::from_utf8_lossy(&bytes).into_owned()
+    };
+    let mut missing = Vec::new();
+    let (mut id, mut driver) =
+        (vk::PhysicalDeviceIDProperties::default(), vk::PhysicalDeviceDriverProperties::default());
+    let api = base.api_version;
+    if api < vk::API_VERSION_1_3 {
+        missing.push("Vulkan 1.3".to_string());
+    } else {
+        let mut f12 = vk::PhysicalDeviceVulkan12Features::default();
+        let mut f13 = vk::PhysicalDeviceVulkan13Features::default();
+        let mut f = vk::PhysicalDeviceFeatures2::default().push_next(&mut f12).push_next(&mut f13);
+        let mut props = vk::PhysicalDeviceProperties2::default().push_next(&mut id).push_next(&mut driver);
+        // SAFETY: as above.
+        unsafe {
+            instance.get_physical_device_features2(p, &mut f);
+            instance.get_physical_device_properties2(p, &mut props);
+        }
+        for (has, what) in [
+            (f13.synchronization2, "synchronization2"),
+            (f13.dynamic_rendering, "dynamicRendering"),
+            (f12.timeline_semaphore, "timelineSemaphore"),
+            (f12.shader_output_layer, "shaderOutputLayer"),
+        ] {
+            if has == vk::FALSE {
+                missing.push(what.to_string());
+            }
+        }
+    }
+    if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::khr::push_descriptor::NAME)) {
+        missing.push("VK_KHR_push_descriptor".to_string());
+    }
+    let all_work = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+    if !families.iter().any(|q| q.queue_flags.contains(all_work) && q.timestamp_valid_bits > 0) {
+        missing.push("a graphics and compute queue with timestamps".to_string());
+    }
+    let l = &base.limits;
+    let driver_name = text(&driver.driver_name);
+    // SAFETY: driver_info is a NUL-terminated array filled by the driver, or zeros.
+    let driver_info = unsafe { CStr::from_ptr(driver.driver_info.as_ptr()) }.to_string_lossy().into_owned();
+    DeviceInfo {
+        name: text(&base.device_name),
+        uuid: id.device_uuid.iter().map(|b| format!("{b:02x}")).collect(),
+        kind: match base.device_type {
+            vk::PhysicalDeviceType::CPU => "cpu",
+            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
+            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
+            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
+            _ => "other",
+        },
+        driver: format!("{driver_name} {driver_info}").trim().to_string(),
+        api: format!(
+            "{}.{}.{}",
+            vk::api_version_major(api),
+            vk::api_version_minor(api),
+            vk::api_version_patch(api)
+        ),
+        max_image_side: l.max_image_dimension2_d,
+        max_layers: l.max_image_array_layers,
+        max_storage_bytes: l.max_storage_buffer_range as u64,
+        device_bytes: memory.memory_heaps[..memory.memory_heap_count as usize]
+            .iter()
+            .filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
+            .map(|h| h.size)
+            .sum(),
+        sample_counts: (l.framebuffer_color_sample_counts & l.framebuffer_depth_sample_counts).as_raw(),
+        timestamp_ns: l.timestamp_period,
+        missing,
+    }
+}

@@ -1,0 +1,119 @@
+//! Light at leaves and on the ground (BN12, section 5, with the corrections that the README lists); twin of
+//! `shaders/physics/light.glsl`.
+
+use std::f64::consts::PI;
+
+/// Angle between two unit vectors, rad; atan2 keeps its precision at 0 and π, where acos loses it.
+pub fn angle_between(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let c = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    (c[0] * c[0] + c[1] * c[1] + c[2] * c[2]).sqrt().atan2(dot)
+}
+
+/// Leaf-scale hotspot F (BN12, eq. 8) at a phase angle, rad: 1 − a₁ (1 − exp(−a₂ angle)).
+pub fn hotspot(angle: f64, a1: f64, a2: f64) -> f64 {
+    1.0 - a1 * (1.0 - (-a2 * angle).exp())
+}
+
+/// Radiance of fully lit, uniformly oriented bi-Lambertian leaves per irradiance (ρ p of BN12 eq. 7), at a phase angle
+/// between viewer and light, from leaf reflectance r and transmittance t.
+///
+/// Ross (1981): Γ = (r + t)(sin β − β cos β)/(3π) + t cos β/3 with β = π − angle; the radiance is 2Γ/π because uniformly
+/// oriented leaves extinguish half their area per volume.
+pub fn leaf_phase(angle: f64, r: f64, t: f64) -> f64 {
+    let b = PI - angle;
+    let gamma = (r + t) * (b.sin() - b * b.cos()) / (3.0 * PI) + t * b.cos() / 3.0;
+    gamma.max(0.0) * 2.0 / PI
+}
+
+/// Sky seen from depth d on the axis of a cylindrical hole of radius r (BN12, eq. 9), `inverse_r2` = 1/r².
+pub fn hole_occlusion(d: f64, inverse_r2: f64) -> f64 {
+    1.0 / (1.0 + d * d * inverse_r2)
+}
+
+/// 2 E₃(x): mean sky visibility of the ground under opaque Poisson crowns of optical thickness x = density × area, the
+/// closed form of D (BN12, eq. 18) for opaque crowns. E₁ by its series below 1 and its continued fraction above.
+pub fn ground_visibility(x: f64) -> f64 {
+    if x <= 0.0 {
+        return 1.0;
+    }
+    let e1 = if x < 1.0 {
+        let (mut sum, mut term) = (-0.577_215_664_901_532_9 - x.ln(), 1.0);
+        for k in 1..40 {
+            term *= -x / f64::from(k);
+            sum -= term / f64::from(k);
+        }
+        sum
+    } else {
+        let mut fraction = 0.0;
+        for k in (1..200).rev() {
+            let k = f64::from(k);
+            fraction = k / (1.0 + k / (x + fraction));
+        }
+        (-x).exp() / (x + fraction)
+    };
+    let e = (-x).exp();
+    e - x * (e - x * e1)
+}
+
+/// Contrast of the ground near trees (BN12, eq. 10), clamped at 0.
+pub fn ground_contrast(coverage: f64, expected: f64, a3: f64) -> f64 {
+    (1.0 - a3 * (coverage - expected)).max(0.0)
+}
+
+/// Fraction of the sun's disc above a level horizon, for the elevation of its centre in degrees; the disc's radius is
+/// 0.2665°. Continuous, 1/2 at 0.
+pub fn sun_disc_fraction(elevation: f64) -> f64 {
+    let h = (elevation / 0.2665).clamp(-1.0, 1.0);
+    0.5 + (h * (1.0 - h * h).sqrt() + h.asin()) / PI
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn leaf_phase_conserves_energy() {
+        // Over all directions 2 Γ / π must give what leaves that extinguish half their area scatter: r + t of what they
+        // intercept, 1/(4π) a steradian on average.
+        let n = 20_000;
+        for (r, t) in [(0.1, 0.05), (0.5, 0.45), (0.3, 0.0), (0.0, 0.3)] {
+            let sum: f64 = (0..n)
+                .map(|k| {
+                    let angle = PI * (f64::from(k) + 0.5) / f64::from(n);
+                    leaf_phase(angle, r, t) * 2.0 * PI * angle.sin() * PI / f64::from(n)
+                })
+                .sum();
+            assert!((sum - (r + t)).abs() < 1e-6, "r {r} t {t}: {sum}");
+        }
+    }
+
+    #[test]
+    fn leaf_phase_at_backscatter_is_that_of_lambertian_leaves() {
+        // Visible leaves weigh cos, lit ones cos: r/π <cos²>/<cos> = 2r/(3π).
+        assert!((leaf_phase(0.0, 0.3, 0.2) - 2.0 * 0.3 / (3.0 * PI)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn ground_visibility_is_the_integral_of_exp_sec() {
+        // 2 ∫ exp(-x / μ) μ dμ by the midpoint rule.
+        for x in [1e-6, 1e-3, 0.1, 0.5, 0.99, 1.01, 3.0, 20.0] {
+            let n = 200_000;
+            let sum: f64 = (0..n)
+                .map(|k| {
+                    let mu = (f64::from(k) + 0.5) / f64::from(n);
+                    2.0 * (-x / mu).exp() * mu / f64::from(n)
+                })
+                .sum();
+            assert!((ground_visibility(x) - sum).abs() < 1e-8, "x {x}: {} {sum}", ground_visibility(x));
+        }
+        assert_eq!(ground_visibility(0.0), 1.0);
+    }
+
+    #[test]
+    fn the_sun_sets_smoothly() {
+        assert_eq!(sun_disc_fraction(5.0), 1.0);
+        assert_eq!(sun_disc_fraction(0.0), 0.5);
+        assert_eq!(sun_disc_fraction(-5.0), 0.0);
+    }
+}
