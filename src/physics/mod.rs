@@ -1,1 +1,4 @@
-//! f64 models of the papers, without Vulkan: the oracle for the shaders of the same name.
+//! The models in double precision, without Vulkan: the oracle for the shaders of the same names.
+
+pub mod views;
+pub mod zfield;
