@@ -1,5 +1,6 @@
 //! Species to data: z-field views, occlusion, optics; cached on disk by content.
 
+pub mod cache;
 mod occlusion;
 mod optics;
 mod raster;
@@ -8,6 +9,7 @@ mod surface;
 mod verify;
 mod views;
 
+pub use cache::{CacheState, load_or_bake};
 pub use verify::{QualityReport, ViewQuality, verify};
 
 use crate::progress::Progress;
@@ -71,14 +73,8 @@ impl From<&Settings> for BakeSettings {
     }
 }
 
-/// Bakes one species, on all threads of the current rayon pool; the result is the same bits for any number of
-/// them. Errors: settings out of range, a mesh without extent.
-pub fn bake_species(
-    mesh: &Mesh,
-    optics: &OpticsOverride,
-    settings: &BakeSettings,
-    quiet: bool,
-) -> Result<SpeciesBake> {
+/// Refuses settings that no bake can be made with.
+fn check(settings: &BakeSettings) -> Result<()> {
     let BakeSettings { rings, resolution, occlusion_rays } = *settings;
     if !(1..=16).contains(&rings)
         || !(16..=512).contains(&resolution)
@@ -90,15 +86,27 @@ pub fn bake_species(
              1 to 16 rings, a power of two from 16 to 512 texels and at least one ray"
         )));
     }
+    Ok(())
+}
+
+/// Bakes one species, on all threads of the current rayon pool; the result is the same bits for any number of
+/// them. Errors: settings out of range, a mesh without extent.
+pub fn bake_species(
+    mesh: &Mesh,
+    optics: &OpticsOverride,
+    settings: &BakeSettings,
+    quiet: bool,
+) -> Result<SpeciesBake> {
+    check(settings)?;
     let surface = Surface::new(mesh)?;
     let solid: Vec<bool> =
         mesh.materials.iter().map(|m| !m.foliage && !m.double_sided && m.alpha_cutoff.is_none()).collect();
     let progress = Progress::new("baking occlusion", Occlusion::vertices(&surface), quiet);
-    let occlusion = Occlusion::new(&surface, &solid, occlusion_rays, &progress);
+    let occlusion = Occlusion::new(&surface, &solid, settings.occlusion_rays, &progress);
     progress.finish();
-    let count = crate::physics::views::count(rings);
+    let count = crate::physics::views::count(settings.rings);
     let progress = Progress::new("baking views", u64::from(count), quiet);
-    let field = views::draw(&surface, &occlusion, rings, resolution, &progress);
+    let field = views::draw(&surface, &occlusion, settings.rings, settings.resolution, &progress);
     progress.finish();
     Ok(optics::species(mesh, &surface, field, optics))
 }

@@ -89,7 +89,11 @@ impl Occlusion {
     }
 
     fn vertex(&self, index: u32) -> Vec3 {
-        let v = UVec3::new(index % self.size.x, index / self.size.x % self.size.y, index / self.size.x / self.size.y);
+        let v = UVec3::new(
+            index % self.size.x,
+            index / self.size.x % self.size.y,
+            index / self.size.x / self.size.y,
+        );
         self.low + v.as_vec3() / self.cells
     }
 
@@ -125,7 +129,8 @@ impl Occlusion {
                     for dz in 0..4 {
                         for dy in 0..4 {
                             for dx in 0..4 {
-                                let v = (UVec3::new(x, y, z) + UVec3::new(dx, dy, dz)).saturating_sub(UVec3::ONE);
+                                let v =
+                                    (UVec3::new(x, y, z) + UVec3::new(dx, dy, dz)).saturating_sub(UVec3::ONE);
                                 if v.cmplt(self.size).all() {
                                     let at = &mut marks[self.index(v)];
                                     *at = (*at).max(touch);

@@ -119,7 +119,8 @@ pub fn volume(field: &ZField) -> f64 {
     let mut total = 0.0;
     for (layer, (i, j)) in field.levels[0].chunks_exact(layer_size).zip(views::pairs(field.n)) {
         let ring = (i.abs() + j.abs()) as f64;
-        let band = ((ring - 0.5).max(0.0) * step).cos() - ((ring + 0.5) * step).min(std::f64::consts::FRAC_PI_2).cos();
+        let band = ((ring - 0.5).max(0.0) * step).cos()
+            - ((ring + 0.5) * step).min(std::f64::consts::FRAC_PI_2).cos();
         let weight = band / (4.0 * ring).max(1.0);
         let basis = Basis::new(views::direction(field.n, i, j));
         let texel = 4.0 * m * m * basis.extent / f64::from(field.resolution).powi(2);

@@ -106,8 +106,11 @@ impl Raster {
         for row in first..last {
             let y = f64::from(row) + 0.5;
             let long = ax + (cx - ax) * ((y - ay) / (cy - ay));
-            let short =
-                if y < by { ax + (bx - ax) * ((y - ay) / (by - ay)) } else { bx + (cx - bx) * ((y - by) / (cy - by)) };
+            let short = if y < by {
+                ax + (bx - ax) * ((y - ay) / (by - ay))
+            } else {
+                bx + (cx - bx) * ((y - by) / (cy - by))
+            };
             let (left, right) = if long < short { (long, short) } else { (short, long) };
             let left = (left - 0.5).ceil().clamp(0.0, limit) as u32;
             let right = (right - 0.5).ceil().clamp(0.0, limit) as u32;

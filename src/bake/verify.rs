@@ -54,7 +54,10 @@ pub fn verify(mesh: &Mesh, bake: &SpeciesBake, directions: u32, iterations: u32)
         .take(directions as usize)
         .collect::<Vec<_>>()
         .into_par_iter()
-        .map_init(|| Raster::new(bake.views.resolution), |raster, w| view(&surface, bake, w, raster, iterations))
+        .map_init(
+            || Raster::new(bake.views.resolution),
+            |raster, w| view(&surface, bake, w, raster, iterations),
+        )
         .collect();
     Ok(QualityReport { views })
 }
@@ -73,7 +76,13 @@ fn between(n: u32) -> impl Iterator<Item = DVec3> {
         .filter(move |w| views::lookup(n, *w).views.iter().all(|v| v.weight > 0.1))
 }
 
-fn view(surface: &Surface, bake: &SpeciesBake, w: DVec3, raster: &mut Raster, iterations: u32) -> ViewQuality {
+fn view(
+    surface: &Surface,
+    bake: &SpeciesBake,
+    w: DVec3,
+    raster: &mut Raster,
+    iterations: u32,
+) -> ViewQuality {
     let resolution = bake.views.resolution;
     let basis = Basis::new(w);
     let image = View::new(&basis, resolution);

@@ -17,7 +17,13 @@ pub fn encode_depth(d: f32) -> f32 {
 }
 
 /// All views of a surface. Each view depends on nothing but the surface: the same bits for any number of threads.
-pub fn draw(surface: &Surface, occlusion: &Occlusion, n: u32, resolution: u32, progress: &Progress) -> ZField {
+pub fn draw(
+    surface: &Surface,
+    occlusion: &Occlusion,
+    n: u32,
+    resolution: u32,
+    progress: &Progress,
+) -> ZField {
     let pairs: Vec<_> = views::pairs(n).collect();
     let layers: Vec<Vec<Vec<u8>>> = pairs
         .par_iter()

@@ -12,7 +12,9 @@ pub fn real_tree(name: &str) -> Mesh {
     let glb = gltf::Gltf::open(path).unwrap();
     let blob = glb.blob.as_deref().unwrap();
     let texture = |t: gltf::texture::Info| {
-        let gltf::image::Source::View { view, .. } = t.texture().source().source() else { panic!("embedded") };
+        let gltf::image::Source::View { view, .. } = t.texture().source().source() else {
+            panic!("embedded")
+        };
         let bytes = &blob[view.offset()..view.offset() + view.length()];
         let image = image::load_from_memory(bytes).unwrap().to_rgba8();
         Arc::new(Texture { width: image.width(), height: image.height(), rgba: image.into_raw() })
