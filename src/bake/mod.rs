@@ -1,5 +1,24 @@
 //! Species to data: z-field views, occlusion, optics; cached on disk by content.
 
+pub mod cache;
+mod occlusion;
+mod optics;
+mod raster;
+mod rays;
+mod surface;
+mod verify;
+mod views;
+
+pub use cache::{CacheState, load_or_bake};
+pub use verify::{QualityReport, ViewQuality, verify};
+
+use crate::progress::Progress;
+use crate::scene::{Mesh, OpticsOverride};
+use crate::settings::Settings;
+use crate::{Error, Result};
+use occlusion::Occlusion;
+use surface::Surface;
+
 /// Everything that drawing one species needs, baked from its mesh once.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpeciesBake {
@@ -35,4 +54,59 @@ pub struct ZField {
     /// Per level, all layers one after the other, rows from the bottom (v = 0) up, RGBA8:
     /// premultiplied nearest depth, farthest depth, occlusion; opacity.
     pub levels: Vec<Vec<u8>>,
+}
+
+/// What a bake depends on beside the mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BakeSettings {
+    /// Rings n of views, 1 to 16: 2n(n+1) + 1 views.
+    pub rings: u32,
+    /// Texels a side of a view: a power of two, 16 to 512.
+    pub resolution: u32,
+    /// Rays a grid vertex for ambient occlusion, at least 1.
+    pub occlusion_rays: u32,
+}
+
+impl From<&Settings> for BakeSettings {
+    fn from(s: &Settings) -> Self {
+        BakeSettings { rings: s.view_rings, resolution: s.view_resolution, occlusion_rays: s.occlusion_rays }
+    }
+}
+
+/// Refuses settings that no bake can be made with.
+fn check(settings: &BakeSettings) -> Result<()> {
+    let BakeSettings { rings, resolution, occlusion_rays } = *settings;
+    if !(1..=16).contains(&rings)
+        || !(16..=512).contains(&resolution)
+        || !resolution.is_power_of_two()
+        || occlusion_rays == 0
+    {
+        return Err(Error::Usage(format!(
+            "cannot bake {rings} rings of {resolution} texels with {occlusion_rays} rays: \
+             1 to 16 rings, a power of two from 16 to 512 texels and at least one ray"
+        )));
+    }
+    Ok(())
+}
+
+/// Bakes one species, on all threads of the current rayon pool; the result is the same bits for any number of
+/// them. Errors: settings out of range, a mesh without extent.
+pub fn bake_species(
+    mesh: &Mesh,
+    optics: &OpticsOverride,
+    settings: &BakeSettings,
+    quiet: bool,
+) -> Result<SpeciesBake> {
+    check(settings)?;
+    let surface = Surface::new(mesh)?;
+    let solid: Vec<bool> =
+        mesh.materials.iter().map(|m| !m.foliage && !m.double_sided && m.alpha_cutoff.is_none()).collect();
+    let progress = Progress::new("baking occlusion", Occlusion::vertices(&surface), quiet);
+    let occlusion = Occlusion::new(&surface, &solid, settings.occlusion_rays, &progress);
+    progress.finish();
+    let count = crate::physics::views::count(settings.rings);
+    let progress = Progress::new("baking views", u64::from(count), quiet);
+    let field = views::draw(&surface, &occlusion, settings.rings, settings.resolution, &progress);
+    progress.finish();
+    Ok(optics::species(mesh, &surface, field, optics))
 }

@@ -6,3 +6,5 @@ pub mod masks;
 pub mod shadow;
 pub mod terrain;
 pub mod tonemap;
+pub mod views;
+pub mod zfield;

@@ -1,0 +1,174 @@
+//! What light meets in a crown, measured from the mesh.
+//!
+//! - Leaf area L: one-sided area of all foliage that the masks leave, m². Every card counts once: the back of
+//!   a card modelled as a second triangle with the same corners does not count again.
+//! - Crown volume V: what the z-field's light rays travel through, m³. A view's ∫ (nearest − farthest depth) dA
+//!   is the volume between its two surfaces; V is its mean over the hemisphere of views.
+//! - Extinction (BBP08 eq. 5): leaves of uniform orientation show half their area to every direction, so
+//!   τ = L/(2V). With this V, the mean over directions of τ·∫(z − z̄)dA is L/2, the leaf area really in the
+//!   way: the medium has the mesh's mean optical depth.
+//! - Albedo: leaf reflectance r is the mean linear colour of the foliage's opaque texels times the material's
+//!   factor; transmittance t is r/2 unless the scene states it; ρ = r + t. Measured broad leaves have t a
+//!   little below r in the visible range and needles well below, and base colour textures carry no
+//!   transmittance at all; r/2 lies between, and keeps ρ < 1 for every r < 2/3.
+//! - A tree without foliage: all of its surface stands for leaves, with the bark's colour and t = 0.
+
+use std::collections::HashSet;
+
+use glam::{Vec2, Vec3};
+
+use super::surface::Surface;
+use super::{SpeciesBake, ZField};
+use crate::physics::views::{self, Basis};
+use crate::scene::{Mesh, OpticsOverride, Texture};
+
+/// Subdivisions a side of a triangle for measuring masks and colours: 256 equal parts, sampled in the middle.
+const PARTS: u32 = 16;
+
+/// The foliage, or the whole surface where there is none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Leaves {
+    /// Whether any of it is foliage.
+    pub foliage: bool,
+    /// One-sided area, m².
+    pub area: f64,
+    /// Mean linear colour.
+    pub color: [f64; 3],
+    /// Height under which 2 % of the area lie, m.
+    pub base: f32,
+}
+
+/// Measures leaf area, colour and base height.
+pub fn leaves(mesh: &Mesh, surface: &Surface) -> Leaves {
+    let foliage = surface.faces.iter().any(|f| mesh.materials[f.material as usize].foliage);
+    let mut seen = HashSet::new();
+    let (mut area, mut color) = (0.0, [0.0; 3]);
+    // (height, area) of each part of a triangle row.
+    let mut heights: Vec<(f32, f64)> = Vec::new();
+    let mut linear = [0f64; 256];
+    for (i, x) in linear.iter_mut().enumerate() {
+        *x = srgb_to_linear(i as f64 / 255.0);
+    }
+    for face in surface.faces.iter().filter(|f| !foliage || mesh.materials[f.material as usize].foliage) {
+        let material = &mesh.materials[face.material as usize];
+        let corners = face.p.map(|p| surface.frame.to_metres(p));
+        let mut key = corners.map(|p| p.to_array().map(f32::to_bits));
+        key.sort_unstable();
+        if !seen.insert(key) {
+            continue;
+        }
+        let [a, b, c] = corners.map(|p| p.as_dvec3());
+        let part = 0.5 * (b - a).cross(c - a).length() / f64::from(PARTS * PARTS);
+        for (s, t) in parts() {
+            let uv = face.uv[0] * (1.0 - s - t) + face.uv[1] * s + face.uv[2] * t;
+            if !surface.opaque(face, uv) {
+                continue;
+            }
+            area += part;
+            heights.push((corners[0].z * (1.0 - s - t) + corners[1].z * s + corners[2].z * t, part));
+            let texel = material.texture.as_ref().map_or([255; 3], |texture| nearest(texture, uv));
+            for i in 0..3 {
+                color[i] += part * linear[texel[i] as usize] * f64::from(material.base_color[i]);
+            }
+        }
+    }
+    heights.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut below = 0.0;
+    let base = heights.iter().find(|(_, a)| {
+        below += a;
+        below >= 0.02 * area
+    });
+    Leaves {
+        foliage,
+        area,
+        color: color.map(|c| if area > 0.0 { c / area } else { 0.0 }),
+        base: base.map_or(0.0, |b| b.0),
+    }
+}
+
+/// Barycentric coordinates of the middles of a triangle's parts.
+fn parts() -> impl Iterator<Item = (f32, f32)> {
+    let n = PARTS;
+    (0..n).flat_map(move |i| {
+        (0..2 * (n - i) - 1).map(move |k| {
+            // Upright parts in even places, upside-down ones between them.
+            let (j, third) = (k / 2, if k % 2 == 0 { 1.0 / 3.0 } else { 2.0 / 3.0 });
+            ((i as f32 + third) / n as f32, (j as f32 + third) / n as f32)
+        })
+    })
+}
+
+fn nearest(texture: &Texture, uv: Vec2) -> [u8; 3] {
+    let wrap = |x: f32, n: u32| ((x - x.floor()) * n as f32) as u32 % n;
+    let at = 4 * (wrap(uv.y, texture.height) * texture.width + wrap(uv.x, texture.width)) as usize;
+    [texture.rgba[at], texture.rgba[at + 1], texture.rgba[at + 2]]
+}
+
+fn srgb_to_linear(x: f64) -> f64 {
+    if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Mean over the hemisphere of the volume between nearest and farthest surfaces, in units of det S.
+///
+/// ∫ (z − z̄) dA over a view is a plain sum over texels, since depths are premultiplied by the opacity. Views
+/// are weighted by their share of the hemisphere: the band of a ring k over its 4k views.
+pub fn volume(field: &ZField) -> f64 {
+    let m = f64::from(field.resolution) / f64::from(field.resolution - 2);
+    let step = std::f64::consts::FRAC_PI_2 / f64::from(field.n);
+    let layer_size = (field.resolution * field.resolution * 4) as usize;
+    let mut total = 0.0;
+    for (layer, (i, j)) in field.levels[0].chunks_exact(layer_size).zip(views::pairs(field.n)) {
+        let ring = (i.abs() + j.abs()) as f64;
+        let band = ((ring - 0.5).max(0.0) * step).cos()
+            - ((ring + 0.5) * step).min(std::f64::consts::FRAC_PI_2).cos();
+        let weight = band / (4.0 * ring).max(1.0);
+        let basis = Basis::new(views::direction(field.n, i, j));
+        let texel = 4.0 * m * m * basis.extent / f64::from(field.resolution).powi(2);
+        let sum: u64 = layer.chunks_exact(4).map(|t| u64::from(t[0].saturating_sub(t[1]))).sum();
+        total += weight * texel * (sum as f64 / 255.0) * 2.0 * std::f64::consts::SQRT_2;
+    }
+    total
+}
+
+/// Horizontal projected area in units of `radius`²: the opacity of the view from the zenith.
+pub fn top_area(field: &ZField) -> f64 {
+    let m = f64::from(field.resolution) / f64::from(field.resolution - 2);
+    let size = (field.resolution * field.resolution * 4) as usize;
+    let zenith = views::layer(field.n, 0, 0) as usize;
+    let sum: u64 =
+        field.levels[0][zenith * size..(zenith + 1) * size].chunks_exact(4).map(|t| u64::from(t[3])).sum();
+    sum as f64 / 255.0 * (2.0 * m / f64::from(field.resolution)).powi(2)
+}
+
+/// Puts views and measurements together; what the scene states wins over what the mesh shows.
+pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOverride) -> SpeciesBake {
+    let leaves = leaves(mesh, surface);
+    let frame = surface.frame;
+    let volume = volume(&views) * frame.scale().as_dvec3().element_product();
+    let measured = if volume > 0.0 { (0.5 * leaves.area / volume) as f32 } else { 0.0 };
+    let color = leaves.color.map(|c| c as f32);
+    let (reflectance, share) = if leaves.foliage {
+        (stated.leaf_reflectance.unwrap_or(color), 0.5)
+    } else {
+        (stated.bark_reflectance.unwrap_or(color), 0.0)
+    };
+    let transmittance = match stated.leaf_transmittance {
+        Some(t) if leaves.foliage => t,
+        _ => reflectance.map(|r| share * r),
+    };
+    let area = top_area(&views) * f64::from(frame.radius).powi(2);
+    SpeciesBake {
+        views,
+        center: frame.center,
+        radius: frame.radius,
+        half_height: frame.half_height,
+        extinction: stated.extinction.unwrap_or(measured),
+        albedo: std::array::from_fn(|i| (reflectance[i] + transmittance[i]).min(1.0)),
+        area: area as f32,
+        crown_radius: (area / std::f64::consts::PI).sqrt() as f32,
+        crown_base: leaves.base,
+        height: surface.faces.iter().flat_map(|f| f.p).fold(f32::NEG_INFINITY, |h, p: Vec3| h.max(p.z))
+            * frame.half_height
+            + frame.center,
+    }
+}

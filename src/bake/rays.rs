@@ -1,0 +1,158 @@
+//! Rays against a tree's surface, through the leaf masks.
+//!
+//! The `bvh` crate builds the hierarchy; it is walked here as a flat list, because the crate's own iterators
+//! either collect every leaf a ray's box touches or keep a stack of 32 nodes that a degenerate mesh overflows.
+
+use bvh::aabb::{Aabb, Bounded};
+use bvh::bounding_hierarchy::BHShape;
+use bvh::bvh::Bvh;
+use glam::{Vec2, Vec3};
+
+use super::surface::Surface;
+
+struct Shape {
+    low: Vec3,
+    high: Vec3,
+    node: usize,
+}
+
+impl Bounded<f32, 3> for Shape {
+    fn aabb(&self) -> Aabb<f32, 3> {
+        Aabb::with_bounds(self.low.to_array().into(), self.high.to_array().into())
+    }
+}
+
+impl BHShape<f32, 3> for Shape {
+    fn set_bh_node_index(&mut self, index: usize) {
+        self.node = index;
+    }
+
+    fn bh_node_index(&self) -> usize {
+        self.node
+    }
+}
+
+/// A node of the flat hierarchy: an inner one goes on to the next node if its box is hit and else to `exit`.
+struct Node {
+    low: Vec3,
+    high: Vec3,
+    exit: u32,
+    /// Face index at a leaf; `u32::MAX` inside.
+    face: u32,
+}
+
+/// A hierarchy over the faces of a surface, in metres.
+pub struct Rays<'a> {
+    surface: &'a Surface,
+    corners: Vec<[Vec3; 3]>,
+    nodes: Vec<Node>,
+}
+
+/// Where a ray meets a face.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Ray parameter.
+    pub t: f32,
+    /// Index of the face.
+    pub face: u32,
+    /// The ray meets the face's back: its corners run clockwise as the ray sees them.
+    pub back: bool,
+}
+
+impl<'a> Rays<'a> {
+    /// Builds the hierarchy.
+    pub fn new(surface: &'a Surface) -> Self {
+        let corners: Vec<[Vec3; 3]> =
+            surface.faces.iter().map(|f| f.p.map(|p| surface.frame.to_metres(p))).collect();
+        let mut shapes: Vec<Shape> = corners
+            .iter()
+            .map(|[a, b, c]| Shape { low: a.min(*b).min(*c), high: a.max(*b).max(*c), node: 0 })
+            .collect();
+        // Sequential on purpose: the order of nodes is then the same every time.
+        let nodes = Bvh::build(&mut shapes).flatten_custom(&|aabb: &Aabb<f32, 3>, entry, exit, face| Node {
+            low: Vec3::new(aabb.min[0], aabb.min[1], aabb.min[2]),
+            high: Vec3::new(aabb.max[0], aabb.max[1], aabb.max[2]),
+            exit,
+            face: if entry == u32::MAX { face } else { u32::MAX },
+        });
+        Rays { surface, corners, nodes }
+    }
+
+    /// Whether anything stands on the ray beyond `t_min` (any unit).
+    pub fn occluded(&self, origin: Vec3, direction: Vec3, t_min: f32) -> bool {
+        let mut hit = false;
+        self.walk(origin, direction, t_min, |_| {
+            hit = true;
+            f32::NEG_INFINITY
+        });
+        hit
+    }
+
+    /// The first surface on the ray beyond `t_min`.
+    pub fn closest(&self, origin: Vec3, direction: Vec3, t_min: f32) -> Option<Hit> {
+        let mut best = None;
+        self.walk(origin, direction, t_min, |hit| {
+            best = Some(hit);
+            hit.t
+        });
+        best
+    }
+
+    /// Whether the face belongs to a solid material.
+    pub fn is_solid(&self, face: u32, solid: &[bool]) -> bool {
+        solid[self.surface.faces[face as usize].material as usize]
+    }
+
+    /// Reports hits to `found`, which answers with the largest parameter still of interest.
+    fn walk(&self, origin: Vec3, direction: Vec3, t_min: f32, mut found: impl FnMut(Hit) -> f32) {
+        let inverse = direction.recip();
+        let mut t_max = f32::INFINITY;
+        let mut index = 0;
+        while let Some(node) = self.nodes.get(index) {
+            if node.face != u32::MAX {
+                if let Some(hit) = self.hit(node.face, origin, direction, t_min, t_max) {
+                    t_max = found(hit);
+                    if t_max < t_min {
+                        return;
+                    }
+                }
+                index += 1;
+                continue;
+            }
+            // Slabs. A ray in the plane of a slab gives 0·∞ = NaN, which min and max pass over.
+            let (t0, t1) = ((node.low - origin) * inverse, (node.high - origin) * inverse);
+            let (near, far) = (t0.min(t1).max_element(), t0.max(t1).min_element());
+            let enters = near <= far * (1.0 + 4.0 * f32::EPSILON) && far >= t_min && near <= t_max;
+            index = if enters { index + 1 } else { node.exit as usize };
+        }
+    }
+
+    /// Möller and Trumbore's intersection, then the mask.
+    fn hit(&self, face: u32, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Option<Hit> {
+        let [a, b, c] = self.corners[face as usize];
+        let (e1, e2) = (b - a, c - a);
+        let p = direction.cross(e2);
+        let det = e1.dot(p);
+        if det == 0.0 {
+            return None;
+        }
+        let inverse = 1.0 / det;
+        let s = origin - a;
+        let u = s.dot(p) * inverse;
+        if !(0.0..=1.0).contains(&u) {
+            return None;
+        }
+        let q = s.cross(e1);
+        let v = direction.dot(q) * inverse;
+        if v < 0.0 || u + v > 1.0 {
+            return None;
+        }
+        let t = e2.dot(q) * inverse;
+        if !(t > t_min && t < t_max) {
+            return None;
+        }
+        let f = &self.surface.faces[face as usize];
+        let uv: Vec2 = f.uv[0] * (1.0 - u - v) + f.uv[1] * u + f.uv[2] * v;
+        self.surface.opaque(f, uv).then_some(Hit { t, face, back: det < 0.0 })
+    }
+}

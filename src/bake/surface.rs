@@ -1,0 +1,159 @@
+//! A species' mesh as the bake sees it: triangles in the scaled tree's space, and leaf masks.
+
+use glam::{Vec2, Vec3};
+
+use crate::scene::{Material, Mesh};
+use crate::{Error, Result};
+
+/// The affine map between the tree and its scaled space, p' = S⁻¹ (p − o): a cylinder r ≤ 1, |z| ≤ 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Height of o, m.
+    pub center: f32,
+    /// Largest horizontal distance from the trunk's axis, m.
+    pub radius: f32,
+    /// Half the range of z, m.
+    pub half_height: f32,
+}
+
+impl Frame {
+    /// The frame of a mesh, a hair wider than the mesh so that rounding leaves no vertex outside.
+    pub fn of(mesh: &Mesh) -> Result<Self> {
+        let points = || mesh.triangles.iter().flat_map(|t| t.vertices).map(|v| mesh.positions[v as usize]);
+        let (mut low, mut high, mut radius) = (f32::INFINITY, f32::NEG_INFINITY, 0f32);
+        for [x, y, z] in points() {
+            low = low.min(z);
+            high = high.max(z);
+            radius = radius.max(x.hypot(y));
+        }
+        let (radius, half_height) = (radius * 1.0001, 0.5 * (high - low) * 1.0001);
+        if !(radius > 0.0 && half_height > 0.0 && radius.is_finite() && half_height.is_finite()) {
+            return Err(Error::Usage(
+                "a tree model needs triangles that extend both sideways and upwards".into(),
+            ));
+        }
+        Ok(Frame { center: 0.5 * (low + high), radius, half_height })
+    }
+
+    /// S, as a vector, m.
+    pub fn scale(&self) -> Vec3 {
+        Vec3::new(self.radius, self.radius, self.half_height)
+    }
+
+    /// Into scaled tree space.
+    pub fn to_scaled(&self, p: Vec3) -> Vec3 {
+        (p - Vec3::Z * self.center) / self.scale()
+    }
+
+    /// Into metres about the trunk's base.
+    pub fn to_metres(&self, p: Vec3) -> Vec3 {
+        p * self.scale() + Vec3::Z * self.center
+    }
+}
+
+/// Where a material is a hole: opacity below its cutoff.
+#[derive(Clone, Debug)]
+pub struct Mask {
+    width: u32,
+    height: u32,
+    /// Opacity × 255 of the texture.
+    alpha: Vec<u8>,
+    /// Opaque where the sum of four alphas with weights of 1/256² is at least this.
+    threshold: u32,
+}
+
+impl Mask {
+    /// The mask of a material; `None` if it has no holes.
+    pub fn of(material: &Material) -> Option<Self> {
+        let (cutoff, texture) = (material.alpha_cutoff?, material.texture.as_ref()?);
+        let threshold = (f64::from(cutoff) / f64::from(material.base_color[3]) * 255.0 * 65536.0).ceil();
+        let alpha: Vec<u8> = texture.rgba.chunks_exact(4).map(|p| p[3]).collect();
+        let hole = |a: &u8| f64::from(*a) * 65536.0 < threshold;
+        alpha.iter().any(hole).then(|| Mask {
+            width: texture.width,
+            height: texture.height,
+            threshold: threshold.min(f64::from(u32::MAX)) as u32,
+            alpha,
+        })
+    }
+
+    /// Whether there is a surface at texture coordinates `uv` ≥ 0, which wrap around: bilinear, 8 bits of fraction.
+    #[inline]
+    pub fn opaque(&self, uv: Vec2) -> bool {
+        // Half a texel back, and a whole texture on so that it stays positive.
+        let x = ((uv.x + 1.0) * (self.width * 256) as f32 - 128.0) as u32;
+        let y = ((uv.y + 1.0) * (self.height * 256) as f32 - 128.0) as u32;
+        let (fx, fy) = (x & 255, y & 255);
+        let wrap = |i: u32, n: u32| if n.is_power_of_two() { i & (n - 1) } else { i % n };
+        let (x0, x1) = (wrap(x >> 8, self.width), wrap((x >> 8) + 1, self.width));
+        let (y0, y1) = (wrap(y >> 8, self.height) * self.width, wrap((y >> 8) + 1, self.height) * self.width);
+        let at = |i: u32| u32::from(self.alpha[i as usize]);
+        let low = at(y0 + x0) * (256 - fx) + at(y0 + x1) * fx;
+        let high = at(y1 + x0) * (256 - fx) + at(y1 + x1) * fx;
+        low * (256 - fy) + high * fy >= self.threshold
+    }
+}
+
+/// A triangle in scaled tree space.
+#[derive(Clone, Copy, Debug)]
+pub struct Face {
+    /// Corners.
+    pub p: [Vec3; 3],
+    /// Texture coordinates of the corners, moved by whole textures so that all are ≥ 0 and small.
+    pub uv: [Vec2; 3],
+    /// Index into [`Surface::masks`]; `None` for a triangle without holes.
+    pub mask: Option<u32>,
+    /// Index of the material.
+    pub material: u32,
+}
+
+/// A mesh ready for rasterising and ray casting.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// The scaled space.
+    pub frame: Frame,
+    /// The triangles.
+    pub faces: Vec<Face>,
+    /// Masks of the materials that have one.
+    pub masks: Vec<Mask>,
+}
+
+impl Surface {
+    /// Prepares a mesh; an error if it has no extent.
+    pub fn new(mesh: &Mesh) -> Result<Self> {
+        let frame = Frame::of(mesh)?;
+        let mut masks = Vec::new();
+        // A material whose factor alone falls below its cutoff is invisible.
+        let invisible = |m: &Material| m.alpha_cutoff.is_some_and(|c| m.base_color[3] < c);
+        let of_material: Vec<(Option<u32>, bool)> = mesh
+            .materials
+            .iter()
+            .map(|m| {
+                let mask = Mask::of(m).map(|mask| {
+                    masks.push(mask);
+                    masks.len() as u32 - 1
+                });
+                (mask, invisible(m))
+            })
+            .collect();
+        let faces = mesh
+            .triangles
+            .iter()
+            .filter(|t| !of_material[t.material as usize].1)
+            .map(|t| {
+                let p = t.vertices.map(|v| frame.to_scaled(Vec3::from(mesh.positions[v as usize])));
+                let uv = t.vertices.map(|v| Vec2::from(mesh.uvs[v as usize]));
+                let base = uv[0].min(uv[1]).min(uv[2]).floor();
+                let mask = of_material[t.material as usize].0;
+                Face { p, uv: uv.map(|c| c - base), mask, material: t.material }
+            })
+            .collect();
+        Ok(Surface { frame, faces, masks })
+    }
+
+    /// Whether the face is there at the texture coordinates, rather than a hole in it.
+    #[inline]
+    pub fn opaque(&self, face: &Face, uv: Vec2) -> bool {
+        face.mask.is_none_or(|m| self.masks[m as usize].opaque(uv))
+    }
+}
