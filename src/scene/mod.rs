@@ -3,11 +3,20 @@
 //!
 //! World axes: x east, y north, z up, metres, relative to the south-west corner of the terrain.
 
+mod file;
+mod input;
+mod keys;
 pub mod mesh;
+pub mod model;
+pub mod positions;
+pub mod raster;
+mod ridge;
+pub mod texture;
 
 use std::sync::Arc;
 
 use crate::settings::Settings;
+pub use file::{default_scene, load, parse};
 pub use mesh::{Material, Mesh, Texture};
 
 /// A whole scene, ready to plan and render.
