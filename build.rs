@@ -140,7 +140,8 @@ fn shader(compiler: &shaderc::Compiler, name: &str, path: &Path, root: &Path, ou
         bindings.push((b.binding, b.name.clone(), kind));
     }
     bindings.sort();
-    let push = module.enumerate_push_constant_blocks(None)?.first().map_or(0, |b| b.size);
+    // Not the block's own size: that is rounded up.
+    let push = module.enumerate_push_constant_blocks(None)?.first().map_or(0, end);
     let mut rust = String::new();
     writeln!(rust, "/// `shaders/{name}`.")?;
     writeln!(rust, "pub static {}: Shader = Shader {{", stem.to_uppercase())?;
@@ -152,6 +153,11 @@ fn shader(compiler: &shaderc::Compiler, name: &str, path: &Path, root: &Path, ou
     }
     writeln!(rust, "    ],\n}};")?;
     Ok(rust)
+}
+
+/// Where the last member of a block ends.
+fn end(block: &ReflectBlockVariable) -> u32 {
+    block.members.iter().map(end).max().unwrap_or(block.absolute_offset + block.size)
 }
 
 /// The Rust twin of `interface.glsl`: reflects each struct in a storage buffer and copies each constant.

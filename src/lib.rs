@@ -3,8 +3,12 @@
 
 pub mod bake;
 pub mod error;
+pub mod forest;
+pub mod frame;
 pub mod gpu;
+pub mod image;
 pub mod physics;
+pub mod plan;
 pub mod progress;
 pub mod scene;
 pub mod settings;

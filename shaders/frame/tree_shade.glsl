@@ -36,7 +36,11 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
     vec3 layers = vec3(view_c[0].w, view_c[1].w, view_c[2].w);
     bool below = (tree_bits.w >> 4u & 1u) != 0u;
     Surface at = Surface(0.0, 0.0, 0.0);
-    for (int k = 0; k < VIEW_ITERATIONS; k++) at = zfield_fetch(views, p, d, layers, w, optics.x, at.s, below);
+    for (int k = 0; k < VIEW_ITERATIONS; k++) {
+        // The first of several reads one mip coarser, so that a small hole before the start does not end the search.
+        float mip = optics.x + (k == 0 && VIEW_ITERATIONS > 1 ? 1.0 : 0.0);
+        at = zfield_fetch(views, p, d, layers, w, mip, at.s, below, k == 0);
+    }
     // Nothing behind the eye is seen: there s would be 1 or more.
     float s = clamp(at.s, -1e3, 0.999);
     float opacity = at.s < 0.999 ? at.opacity * optics.z : 0.0;
@@ -59,7 +63,7 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
             // Start on the plane through the centre across the light.
             metres = -dot(lw, vec3(lp[0].z, lp[1].z, lp[2].z)) / dot(lw, vec3(ld[0].z, ld[1].z, ld[2].z));
             for (int k = 0; k < LIGHT_ITERATIONS; k++) {
-                metres = zfield_fetch(views, lp, ld, light_layers, lw, optics.x, metres, false).s;
+                metres = zfield_fetch(views, lp, ld, light_layers, lw, optics.x, metres, false, k == 0).s;
             }
             metres = max(metres, 0.0);
             lit = exp(-optics.y * metres);

@@ -17,8 +17,8 @@ use crate::scene::{Mesh, OpticsOverride};
 
 const MAGIC: [u8; 8] = *b"CANOPYZF";
 /// Goes into the key: to be raised with every change of the format or of what a bake computes.
-const VERSION: u32 = 1;
-const SCALARS: usize = 11;
+const VERSION: u32 = 2;
+const SCALARS: usize = 14;
 const HEADER: usize = 8 + 4 + 32 + 4 * SCALARS;
 const CHECKSUM: usize = 32;
 
@@ -120,15 +120,18 @@ pub fn path(dir: &Path, key: &[u8; 32]) -> PathBuf {
 }
 
 fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
-    let [red, green, blue] = b.albedo;
+    let ([r0, r1, r2], [t0, t1, t2]) = (b.reflectance, b.transmittance);
     [
         b.center,
         b.radius,
         b.half_height,
         b.extinction,
-        red,
-        green,
-        blue,
+        r0,
+        r1,
+        r2,
+        t0,
+        t1,
+        t2,
         b.area,
         b.crown_radius,
         b.crown_base,
@@ -187,7 +190,7 @@ fn read(path: &Path, key: &[u8; 32], settings: &BakeSettings) -> io::Result<Spec
     if hasher.finalize() != checksum {
         return Err(damaged("the cached file is damaged (its checksum differs)"));
     }
-    let [center, radius, half_height, extinction, red, green, blue, area, crown_radius, crown_base, height] =
+    let [center, radius, half_height, extinction, r0, r1, r2, t0, t1, t2, area, crown_radius, crown_base, height] =
         x;
     Ok(SpeciesBake {
         views: ZField { n: settings.rings, resolution: settings.resolution, levels },
@@ -195,7 +198,8 @@ fn read(path: &Path, key: &[u8; 32], settings: &BakeSettings) -> io::Result<Spec
         radius,
         half_height,
         extinction,
-        albedo: [red, green, blue],
+        reflectance: [r0, r1, r2],
+        transmittance: [t0, t1, t2],
         area,
         crown_radius,
         crown_base,

@@ -32,8 +32,10 @@ pub struct SpeciesBake {
     pub half_height: f32,
     /// Extinction coefficient of the crown, 1/m.
     pub extinction: f32,
-    /// Leaf single-scattering albedo, linear RGB: reflectance + transmittance.
-    pub albedo: [f32; 3],
+    /// Leaf reflectance, linear RGB.
+    pub reflectance: [f32; 3],
+    /// Leaf transmittance, linear RGB; with the reflectance it makes the single-scattering albedo.
+    pub transmittance: [f32; 3],
     /// Horizontal projected area of the unscaled tree, m² (A of BN12 for scale 1).
     pub area: f32,
     /// Foliage (crown) half width, m.

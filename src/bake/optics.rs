@@ -163,7 +163,9 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
         radius: frame.radius,
         half_height: frame.half_height,
         extinction: stated.extinction.unwrap_or(measured),
-        albedo: std::array::from_fn(|i| (reflectance[i] + transmittance[i]).min(1.0)),
+        reflectance,
+        // A leaf scatters no more than it gets.
+        transmittance: std::array::from_fn(|i| transmittance[i].min(1.0 - reflectance[i])),
         area: area as f32,
         crown_radius: (area / std::f64::consts::PI).sqrt() as f32,
         crown_base: leaves.base,

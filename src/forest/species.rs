@@ -36,7 +36,7 @@ impl SpeciesData {
     /// [`Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, baked: &[Arc<SpeciesBake>]) -> Result<Self> {
         let n = scene.settings.view_rings;
-        let view_count = views::view_count(n);
+        let view_count = views::count(n);
         let resolution = scene.settings.view_resolution;
         let texels = gpu.image(&ImageDesc {
             name: "z-field views",
@@ -55,17 +55,16 @@ impl SpeciesData {
                 gpu.upload_image(&texels, level as u32, k as u32 * view_count, view_count, bytes)?;
             }
         }
-        let bases: Vec<ViewBasis> = views::all(n)
-            .iter()
-            .map(|v| {
-                // The one-texel border: u = 1/2 + (p · right) / (2 m), v likewise over the view's vertical extent.
+        let bases: Vec<ViewBasis> = views::pairs(n)
+            .map(|(i, j)| {
+                // u = 1/2 + (p · right) / (2 m), v = 1/2 + (p · up) / (2 m extent), with a border of one texel.
+                let basis = views::Basis::new(views::direction(n, i, j));
                 let m = f64::from(resolution) / f64::from(resolution - 2);
-                let height = v.direction[2] + v.direction[0].hypot(v.direction[1]);
-                let row = |a: [f64; 3], s: f64| [a[0] * s, a[1] * s, a[2] * s, 0.0].map(|x| x as f32);
+                let row = |a: glam::DVec3, s: f64| [a.x * s, a.y * s, a.z * s, 0.0].map(|x| x as f32);
                 ViewBasis {
-                    u: row(v.right, 0.5 / m),
-                    v: row(v.up, 0.5 / (height * m)),
-                    depth: row(v.direction, 1.0),
+                    u: row(basis.right, 0.5 / m),
+                    v: row(basis.up, 0.5 / (basis.extent * m)),
+                    depth: row(basis.w, 1.0),
                 }
             })
             .collect();

@@ -182,9 +182,8 @@ fn listen(
         .message_severity(
             vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
         )
-        .message_type(
-            vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
-        )
+        // Not PERFORMANCE: it dislikes images in GENERAL layout, which is a choice here.
+        .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
         .pfn_user_callback(Some(on_message))
         .user_data(Arc::as_ptr(messages) as *mut c_void);
     // SAFETY: `messages` is kept by `Shared` until after the messenger is destroyed.
@@ -233,7 +232,11 @@ fn open(
             .timeline_semaphore(true)
             .shader_output_layer(true);
         let mut f13 =
-            vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).dynamic_rendering(true);
+            vk::PhysicalDeviceVulkan13Features::default()
+            .synchronization2(true)
+            .dynamic_rendering(true)
+            // glslang writes workgroup sizes as LocalSizeId.
+            .maintenance4(true);
         let create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queue_info)
             .enabled_extension_names(&extensions)

@@ -134,6 +134,7 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
         for (has, what) in [
             (f13.synchronization2, "synchronization2"),
             (f13.dynamic_rendering, "dynamicRendering"),
+            (f13.maintenance4, "maintenance4"),
             (f12.timeline_semaphore, "timelineSemaphore"),
             (f12.shader_output_layer, "shaderOutputLayer"),
         ] {

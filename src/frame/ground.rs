@@ -1,0 +1,107 @@
+//! The terrain pass.
+
+use super::shadows::TerrainPush;
+use super::targets::ImageTargets;
+use crate::Result;
+use crate::forest::seeds::SeedData;
+use crate::forest::terrain::{TerrainData, TerrainDraws};
+use crate::gpu::interface::{GRID_SIDE, NO_PAGE, TERRAIN_CELLS, TERRAIN_HEIGHTS};
+use crate::gpu::{
+    Blend, Buffer, DepthTest, GraphicsDesc, Gpu, Image, ImageDesc, Program, Recorder, Resource, Sampler, Targets,
+    Topology, shaders, vk,
+};
+use crate::plan::Plan;
+
+/// Draws the ground.
+pub struct Ground {
+    /// Indices of a quad's mesh.
+    pub indices: Buffer,
+    program: Program,
+    /// Stand for coverage and pages in scenes without trees.
+    no_coverage: Image,
+    no_pages: Buffer,
+}
+
+impl Ground {
+    /// Makes the program.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the device fails.
+    pub fn new(gpu: &Gpu, plan: &Plan) -> Result<Self> {
+        let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
+        let side = TERRAIN_HEIGHTS;
+        let cells = (0..TERRAIN_CELLS * TERRAIN_CELLS).map(|k| (k % TERRAIN_CELLS) + side * (k / TERRAIN_CELLS));
+        // Diagonals run the same way at every level, so that a morphed quad is the coarser one exactly.
+        let indices: Vec<u32> =
+            cells.flat_map(|k| [k, k + 1, k + side + 1, k, k + side + 1, k + side]).collect();
+        Ok(Ground {
+            indices: gpu.buffer_with("terrain indices", &indices)?,
+            program: gpu.graphics(&GraphicsDesc {
+                vert: &shaders::FRAME_TERRAIN_VERT,
+                frag: if plan.layers {
+                    &shaders::FRAME_TERRAIN_LAYERS_FRAG
+                } else {
+                    &shaders::FRAME_TERRAIN_FRAG
+                },
+                colors: &formats,
+                samples: plan.samples,
+                depth: DepthTest::Reverse,
+                blend: Blend::Replace,
+                topology: Topology::Triangles,
+                constants: &[],
+            })?,
+            no_coverage: gpu.image(&ImageDesc {
+                name: "no coverage",
+                format: vk::Format::R8G8B8A8_UNORM,
+                size: [1; 2],
+                layers: 1,
+                levels: 1,
+                samples: 1,
+                usage: vk::ImageUsageFlags::empty(),
+            })?,
+            no_pages: gpu.buffer_with("no pages", &vec![NO_PAGE; (GRID_SIDE * GRID_SIDE) as usize])?,
+        })
+    }
+
+    /// Records the pass. With `sky` the image starts from that colour, else from what is there.
+    #[allow(clippy::too_many_arguments)]
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        (terrain, draws): (&TerrainData, &TerrainDraws),
+        seeds: Option<&SeedData>,
+        shadow_map: &Image,
+        targets: &ImageTargets,
+        sky: Option<[f32; 3]>,
+    ) {
+        let color = |k: usize| match (targets.colors.len(), k) {
+            // With layers the background is sky light that no tree or ground reflects.
+            (1, _) => sky.map(|c| [c[0], c[1], c[2], 0.0]),
+            (_, 1) => sky.map(|c| [c[0], c[1], c[2], 0.0]),
+            _ => sky.map(|_| [0.0; 4]),
+        };
+        let colors: Vec<_> =
+            targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), seeds.is_none())).collect();
+        let depth = Some(targets.depth.attachment(Some([0.0; 4]), seeds.is_none()));
+        let (coverage, pages) =
+            seeds.map_or((&self.no_coverage, &self.no_pages), |s| (&s.coverage, &s.pages));
+        recorder.render("terrain", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
+            pass.bind(
+                &self.program,
+                &[
+                    ("view", Resource::Buffer(view)),
+                    ("quads", Resource::Buffer(&terrain.quads)),
+                    ("height_tiles", Resource::Texture(&terrain.height_tiles, Sampler::Nearest)),
+                    ("slope_tiles", Resource::Texture(&terrain.slope_tiles, Sampler::Linear)),
+                    ("albedo", Resource::Texture(&terrain.albedo, Sampler::Linear)),
+                    ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+                    ("coverage", Resource::Texture(coverage, Sampler::Linear)),
+                    ("pages", Resource::Buffer(pages)),
+                ],
+            );
+            pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
+            pass.draw_indexed(&self.indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, draws.camera.1);
+        });
+    }
+}

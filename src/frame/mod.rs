@@ -1,0 +1,220 @@
+//! A frame: every pass in order, in [`Renderer::render`].
+
+pub mod camera;
+pub mod cascades;
+pub mod ground;
+pub mod shadows;
+pub mod sky;
+pub mod targets;
+pub mod tonemap;
+pub mod trees;
+pub mod view;
+
+use std::sync::Arc;
+
+use crate::bake::SpeciesBake;
+use crate::forest::cull::{CullData, TreeCounts};
+use crate::forest::seeds::SeedData;
+use crate::forest::species::SpeciesData;
+use crate::forest::terrain::TerrainData;
+use crate::gpu::interface::View;
+use crate::gpu::{Buffer, Gpu, PassTime};
+use crate::image::Picture;
+use crate::plan::Plan;
+use crate::scene::{Camera, Scene};
+use crate::{Error, Result};
+use camera::Eye;
+use ground::Ground;
+use shadows::Shadows;
+use sky::SkyPass;
+use targets::ImageTargets;
+use tonemap::Tonemap;
+use trees::Trees;
+use view::Light;
+
+/// What lives between frames for the trees; absent from scenes without.
+pub struct Forest {
+    /// Seeds and coverage tiles.
+    pub seeds: SeedData,
+    /// Species tables.
+    pub species: SpeciesData,
+    /// Culling.
+    pub cull: CullData,
+    pass: Trees,
+}
+
+/// Draws a scene as its plan says.
+pub struct Renderer {
+    gpu: Gpu,
+    scene: Arc<Scene>,
+    plan: Plan,
+    light: Light,
+    view: Buffer,
+    targets: ImageTargets,
+    terrain: TerrainData,
+    ground: Ground,
+    shadows: Shadows,
+    sky: Option<SkyPass>,
+    tonemap: Tonemap,
+    forest: Option<Forest>,
+    mean_area: f64,
+}
+
+/// What a frame took and drew.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct FrameReport {
+    /// GPU time of every pass, in order.
+    pub passes: Vec<PassTime>,
+    /// Trees drawn.
+    pub trees: TreeCounts,
+    /// Terrain quads drawn to the image.
+    pub terrain_quads: u32,
+    /// Seed quads culled.
+    pub seed_quads: u32,
+}
+
+impl Renderer {
+    /// Builds what the plan lists.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, scene: Arc<Scene>, plan: Plan, baked: &[Arc<SpeciesBake>]) -> Result<Self> {
+        let areas = scene.species.iter().zip(baked).map(|(_, b)| f64::from(b.area));
+        let mean_area = areas.sum::<f64>() / baked.len().max(1) as f64;
+        let forest = if plan.range > 0.0 {
+            let species = SpeciesData::new(gpu, &scene, &plan, baked)?;
+            Some(Forest {
+                seeds: SeedData::new(gpu, &scene, &plan)?,
+                cull: CullData::new(gpu, &scene, &plan)?,
+                pass: Trees::new(gpu, &scene, &plan, species.mask_rows)?,
+                species,
+            })
+        } else {
+            None
+        };
+        Ok(Renderer {
+            view: gpu.buffer("view", size_of::<View>() as u64)?,
+            targets: ImageTargets::new(gpu, &plan)?,
+            terrain: TerrainData::new(gpu, &scene, &plan)?,
+            ground: Ground::new(gpu, &plan)?,
+            shadows: Shadows::new(gpu, &scene, &plan)?,
+            sky: SkyPass::new(gpu, &scene, &plan)?,
+            tonemap: Tonemap::new(gpu, &plan)?,
+            light: Light::new(&scene),
+            gpu: gpu.clone(),
+            scene,
+            plan,
+            forest,
+            mean_area,
+        })
+    }
+
+    /// The plan that is drawn.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// What lives between frames for the trees.
+    pub fn forest(&self) -> Option<&Forest> {
+        self.forest.as_ref()
+    }
+
+    /// Draws one frame and waits for it.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when the view needs more quads or trees than the plan holds; [`Error::Device`].
+    pub fn render(&mut self, camera: &Camera, exposure: f64) -> Result<FrameReport> {
+        self.render_eye(&Eye::new(camera, &self.scene.terrain, self.plan.size), exposure).map(|(r, _)| r)
+    }
+
+    /// Draws one frame from an eye; also returns the view that the shaders got.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`].
+    pub fn render_eye(&mut self, eye: &Eye, exposure: f64) -> Result<(FrameReport, View)> {
+        let (gpu, scene, plan) = (&self.gpu, &self.scene, &self.plan);
+        let sun = self.light.direction;
+        let [lowest, highest] = self.terrain.tree.total_range();
+        let cascades = Shadows::cascades(scene, plan, eye, sun, highest + plan.tallest);
+
+        // Stream: which quads, where in the caches, what is new.
+        let pixels = f64::from(scene.settings.terrain_pixels);
+        let draws = self.terrain.update(gpu, eye, &cascades, pixels)?;
+        let mut work = None;
+        if let Some(forest) = &mut self.forest {
+            let reach = shadow_reach(sun, plan.cascades, plan.tallest + 0.25 * (highest - lowest));
+            work = Some(forest.seeds.update(gpu, &self.terrain.tree, eye, plan.range, reach)?);
+        }
+        let seeds = self.forest.as_ref().map(|f| &f.seeds);
+        let step = self.terrain.tree.step();
+        let view = view::view(scene, plan, eye, &self.light, &cascades, seeds, step, self.mean_area);
+        gpu.upload(&self.view, 0, &[view])?;
+
+        let mut recorder = gpu.record()?;
+        self.terrain.produce(&mut recorder, &draws);
+        if let (Some(forest), Some(work)) = (&self.forest, &work) {
+            forest.seeds.produce(&mut recorder, work, &self.terrain, &forest.species);
+            forest.cull.record(&mut recorder, &self.view, &forest.seeds, &forest.species);
+        }
+        let trees = self.forest.as_ref().map(|f| (&f.cull, &f.seeds, &f.species));
+        let ground = (&self.terrain, &draws);
+        self.shadows.record(&mut recorder, &self.view, &self.ground.indices, ground, trees);
+        if let Some(sky) = &self.sky {
+            sky.record(&mut recorder, &self.view, &self.targets);
+        }
+        let clear = self.sky.is_none().then(|| self.light.sky.map(|c| (c * self.light.scale) as f32));
+        let shadow_map = &self.shadows.map;
+        self.ground.record(&mut recorder, &self.view, ground, seeds, shadow_map, &self.targets, clear);
+        if let Some(forest) = &self.forest {
+            forest.pass.record(&mut recorder, &self.view, forest, shadow_map, &self.targets);
+        }
+        self.tonemap.record(&mut recorder, &self.targets, plan, exposure / self.light.scale);
+        let passes = recorder.submit()?;
+
+        let trees = match &self.forest {
+            Some(forest) if forest.seeds.visible > 0 => forest.cull.counts(gpu, cascades.len())?,
+            _ => TreeCounts::default(),
+        };
+        let report = FrameReport {
+            passes,
+            trees,
+            terrain_quads: draws.camera.1,
+            seed_quads: self.forest.as_ref().map_or(0, |f| f.seeds.visible),
+        };
+        Ok((report, view))
+    }
+
+    /// Reads the last frame back: the display picture, and with layers the linear image.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    pub fn picture(&self) -> Result<Picture> {
+        Picture::read(&self.gpu, &self.plan, &self.targets, self.light.scale)
+    }
+
+    /// The device that draws.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+}
+
+/// How far, and which way, a shadow of something `tall` reaches on level ground; at most twenty times its height.
+fn shadow_reach(sun: [f64; 3], cascades: u32, tall: f64) -> [f64; 3] {
+    if cascades == 0 {
+        return [0.0; 3];
+    }
+    let length = tall / sun[2].max(0.05);
+    [-sun[0] * length, -sun[1] * length, -sun[2] * length]
+}
+
+/// Rejects an exposure that is not a positive number.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn check_exposure(ev: f64) -> Result<f64> {
+    if ev.is_finite() && ev.abs() <= 64.0 {
+        Ok(ev.exp2())
+    } else {
+        Err(Error::Usage(format!("exposure {ev} EV; it takes -64 to 64")))
+    }
+}

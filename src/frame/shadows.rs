@@ -1,0 +1,140 @@
+//! All cascades in one layered pass: the terrain, then the trees' backs (BN12, section 5).
+
+use super::camera::Eye;
+use super::cascades::Cascade;
+use crate::forest::cull::CullData;
+use crate::forest::seeds::SeedData;
+use crate::forest::species::SpeciesData;
+use crate::forest::terrain::{TerrainData, TerrainDraws};
+use crate::gpu::interface::{DrawCommand, TERRAIN_CELLS, TerrainParameters};
+use crate::gpu::{
+    Attachment, Blend, Buffer, DepthTest, GraphicsDesc, Gpu, Image, ImageDesc, Program, Recorder, Resource,
+    Sampler, Targets, Topology, shaders, vk,
+};
+use crate::plan::Plan;
+use crate::scene::Scene;
+use crate::Result;
+
+/// Push constants of a terrain draw.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct TerrainPush {
+    /// Parameters of the terrain.
+    pub parameters: TerrainParameters,
+    /// Cascade drawn to.
+    pub cascade: u32,
+}
+
+/// Shadow maps and the programs that draw them.
+pub struct Shadows {
+    /// Depth and opacity of the caster nearest the sun, one layer a cascade.
+    pub map: Image,
+    depth: Option<Image>,
+    programs: Option<(Program, Program)>,
+}
+
+impl Shadows {
+    /// Allocates for a plan; without sun, one texel that nothing is drawn to.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
+        let on = plan.cascades > 0;
+        let side = if on { scene.settings.cascade_size } else { 1 };
+        let layers = plan.cascades.max(1);
+        let image = |name, format, usage| {
+            gpu.image(&ImageDesc { name, format, size: [side; 2], layers, levels: 1, samples: 1, usage })
+        };
+        let program = |vert, frag, constants| {
+            gpu.graphics(&GraphicsDesc {
+                vert,
+                frag,
+                colors: &[vk::Format::R32_UINT],
+                samples: 1,
+                depth: DepthTest::Reverse,
+                blend: Blend::Replace,
+                topology: Topology::Triangles,
+                constants,
+            })
+        };
+        let resolution = [(1, (scene.settings.view_resolution as f32).to_bits())];
+        let map = image("shadow cascades", vk::Format::R32_UINT, vk::ImageUsageFlags::COLOR_ATTACHMENT)?;
+        if !on {
+            return Ok(Shadows { map, depth: None, programs: None });
+        }
+        Ok(Shadows {
+            map,
+            depth: Some(image(
+                "shadow depth",
+                vk::Format::D32_SFLOAT,
+                vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+            )?),
+            programs: Some((
+                program(&shaders::FRAME_TERRAIN_SHADOW_VERT, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[])?,
+                program(&shaders::FRAME_TREE_SHADOW_VERT, &shaders::FRAME_TREE_SHADOW_FRAG, &resolution)?,
+            )),
+        })
+    }
+
+    /// The cascades of an eye.
+    pub fn cascades(scene: &Scene, plan: &Plan, eye: &Eye, sun: [f64; 3], highest: f64) -> Vec<Cascade> {
+        if plan.cascades == 0 {
+            return Vec::new();
+        }
+        // Nothing is nearer than the highest treetop is below the eye.
+        let clear = eye.position[2] - highest;
+        let near = (0.02 * plan.shadow_distance).min(5.0).max(clear).min(0.5 * plan.shadow_distance);
+        let s = &scene.settings;
+        let (count, split) = (plan.cascades, f64::from(s.cascade_split));
+        super::cascades::cascades(eye, sun, near, plan.shadow_distance, count, split, s.cascade_size)
+    }
+
+    /// Records the pass.
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        indices: &Buffer,
+        (terrain, draws): (&TerrainData, &TerrainDraws),
+        trees: Option<(&CullData, &SeedData, &SpeciesData)>,
+    ) {
+        let (Some(depth), Some((ground, tree))) = (&self.depth, &self.programs) else { return };
+        let targets = Targets {
+            colors: &[Attachment { image: &self.map, resolve: None, clear: Some([0.0; 4]) }],
+            depth: Some(Attachment { image: depth, resolve: None, clear: Some([0.0; 4]) }),
+            layers: self.map.layers(),
+        };
+        recorder.render("shadows", &targets, |pass| {
+            pass.bind(
+                ground,
+                &[
+                    ("view", Resource::Buffer(view)),
+                    ("quads", Resource::Buffer(&terrain.quads)),
+                    ("height_tiles", Resource::Texture(&terrain.height_tiles, Sampler::Nearest)),
+                ],
+            );
+            for (c, (first, count)) in draws.cascades.iter().enumerate() {
+                let parameters = terrain.parameters(*first);
+                pass.push(&TerrainPush { parameters, cascade: c as u32 });
+                pass.draw_indexed(indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, *count);
+            }
+            let Some((cull, seeds, species)) = trees else { return };
+            pass.bind(
+                tree,
+                &[
+                    ("view", Resource::Buffer(view)),
+                    ("trees", Resource::Buffer(&cull.trees)),
+                    ("lists", Resource::Buffer(&cull.lists)),
+                    ("species", Resource::Buffer(&species.table)),
+                    ("bases", Resource::Buffer(&species.bases)),
+                    ("views", Resource::Texture(&species.views, Sampler::LinearBorder)),
+                ],
+            );
+            for c in 0..self.map.layers() {
+                pass.push(&c);
+                let command = u64::from(1 + c) * size_of::<DrawCommand>() as u64;
+                pass.draw_indexed_indirect(&seeds.quad_indices, &cull.commands, command);
+            }
+        });
+    }
+}

@@ -1,0 +1,77 @@
+//! The tree pass: one quad a tree, front to back, each with its own sample mask (BN12, section 5 and 8).
+
+use super::Forest;
+use super::targets::ImageTargets;
+use crate::Result;
+use crate::gpu::{
+    Blend, Buffer, DepthTest, GraphicsDesc, Gpu, Image, Program, Recorder, Resource, Sampler, Targets, Topology,
+    shaders,
+};
+use crate::plan::Plan;
+use crate::scene::Scene;
+
+/// Draws z-field trees.
+pub struct Trees {
+    program: Program,
+}
+
+impl Trees {
+    /// Makes the program.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the device fails.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, mask_rows: u32) -> Result<Self> {
+        let s = &scene.settings;
+        let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
+        let program = gpu.graphics(&GraphicsDesc {
+            vert: &shaders::FRAME_TREE_VERT,
+            frag: if plan.layers { &shaders::FRAME_TREE_LAYERS_FRAG } else { &shaders::FRAME_TREE_FRAG },
+            colors: &formats,
+            samples: plan.samples,
+            depth: DepthTest::Reverse,
+            blend: Blend::Replace,
+            topology: Topology::Triangles,
+            constants: &[
+                (1, (s.view_resolution as f32).to_bits()),
+                (2, mask_rows),
+                (3, plan.samples),
+                (4, s.view_iterations),
+                (5, s.light_iterations),
+                (6, u32::from(plan.cascades > 0)),
+            ],
+        })?;
+        Ok(Trees { program })
+    }
+
+    /// Records the pass.
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        forest: &Forest,
+        shadow_map: &Image,
+        targets: &ImageTargets,
+    ) {
+        let colors: Vec<_> = targets.colors.iter().map(|t| t.attachment(None, true)).collect();
+        let depth = Some(targets.depth.attachment(None, true));
+        recorder.render("trees", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
+            if forest.seeds.visible == 0 {
+                return;
+            }
+            pass.bind(
+                &self.program,
+                &[
+                    ("view", Resource::Buffer(view)),
+                    ("trees", Resource::Buffer(&forest.cull.trees)),
+                    ("lists", Resource::Buffer(&forest.cull.lists)),
+                    ("species", Resource::Buffer(&forest.species.table)),
+                    ("bases", Resource::Buffer(&forest.species.bases)),
+                    ("masks", Resource::Buffer(&forest.species.masks)),
+                    ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
+                    ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+                ],
+            );
+            pass.draw_indexed_indirect(&forest.seeds.quad_indices, &forest.cull.commands, 0);
+        });
+    }
+}

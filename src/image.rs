@@ -1,0 +1,157 @@
+//! Images out: PNG for eyes, linear EXR with named layers for measurements. Written aside, then renamed.
+
+use std::io::Write;
+use std::path::Path;
+
+use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image as ExrImage, Layer, LayerAttributes, WritableImage};
+use half::f16;
+
+use crate::frame::camera::NEAR_PLANE;
+use crate::frame::targets::ImageTargets;
+use crate::gpu::Gpu;
+use crate::plan::Plan;
+use crate::{Error, Result};
+
+/// One frame, on the host.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Pixels.
+    pub size: [u32; 2],
+    /// Display picture: sRGB, RGBA, row 0 at the top.
+    pub display: Vec<u8>,
+    /// The linear image, if the plan had layers.
+    pub linear: Option<Linear>,
+}
+
+/// The linear image, row 0 at the top. Radiance is the sum of its two parts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Linear {
+    /// Radiance from the sun, RGB, in the scene's units.
+    pub sun: Vec<[f32; 3]>,
+    /// Radiance from the sky, RGB; the background is all sky.
+    pub sky: Vec<[f32; 3]>,
+    /// Distance along the view axis, m; 0 where nothing is.
+    pub depth: Vec<f32>,
+    /// Fraction of the pixel's samples that show trees.
+    pub coverage: Vec<f32>,
+    /// Species at the pixel's first sample, counted from 1; 0 where no tree is.
+    pub species: Vec<u32>,
+}
+
+impl Picture {
+    /// Reads the targets of a frame drawn with radiances times `scale`.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    pub fn read(gpu: &Gpu, plan: &Plan, targets: &ImageTargets, scale: f64) -> Result<Self> {
+        let pixels = plan.size[0] as usize * plan.size[1] as usize;
+        let words: Vec<u32> = gpu.read(&targets.picture, 0, pixels)?;
+        let display = bytemuck::cast_slice(&words).to_vec();
+        let linear = plan.layers.then(|| -> Result<Linear> {
+            let part = |k: usize| gpu.read_image::<[u16; 4]>(&targets.colors[k].image, 0, 0);
+            let (sun, sky) = (part(0)?, part(1)?);
+            let rgb = |t: &[u16; 4]| {
+                [0, 1, 2].map(|k| (f64::from(f16::from_bits(t[k]).to_f32()) / scale) as f32)
+            };
+            let depth = gpu.read_image::<f32>(&targets.depth.image, 0, 0)?;
+            Ok(Linear {
+                sun: sun.iter().map(rgb).collect(),
+                sky: sky.iter().map(rgb).collect(),
+                // Reverse Z with an infinite far plane: depth = near / distance.
+                depth: depth.iter().map(|z| if *z > 0.0 { NEAR_PLANE as f32 / z } else { 0.0 }).collect(),
+                coverage: sky.iter().map(|t| f16::from_bits(t[3]).to_f32()).collect(),
+                species: gpu.read_image(&targets.colors[2].image, 0, 0)?,
+            })
+        });
+        Ok(Picture { size: plan.size, display, linear: linear.transpose()? })
+    }
+
+    /// Writes the display picture as PNG.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write_png(&self, path: &Path) -> Result<()> {
+        let mut bytes = Vec::new();
+        let rgb: Vec<u8> = self.display.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+        let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
+        image::ImageEncoder::write_image(
+            encoder,
+            &rgb,
+            self.size[0],
+            self.size[1],
+            image::ExtendedColorType::Rgb8,
+        )
+        .map_err(|e| Error::io(path, std::io::Error::other(e)))?;
+        write_whole(path, &bytes)
+    }
+
+    /// Writes the linear image as EXR: layers `radiance`, `sun`, `sky` (R, G, B), `depth` (Z), `trees` (coverage) and
+    /// `species` (id).
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if the plan had no layers; [`Error::Io`].
+    pub fn write_exr(&self, path: &Path) -> Result<()> {
+        let Some(l) = &self.linear else {
+            return Err(Error::Usage("an EXR needs a plan with layers".into()));
+        };
+        let size = (self.size[0] as usize, self.size[1] as usize);
+        let radiance: Vec<[f32; 3]> =
+            l.sun.iter().zip(&l.sky).map(|(a, b)| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]).collect();
+        let layer = |name: &str, channels: Vec<(&str, FlatSamples)>| {
+            let channels: Vec<_> =
+                channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples)).collect();
+            Layer::new(
+                size,
+                LayerAttributes::named(name),
+                Encoding::SMALL_LOSSLESS,
+                AnyChannels::sort(channels.into()),
+            )
+        };
+        let rgb = |name: &str, data: &[[f32; 3]]| {
+            let channel = |k: usize| FlatSamples::F32(data.iter().map(|p| p[k]).collect());
+            layer(name, vec![("R", channel(0)), ("G", channel(1)), ("B", channel(2))])
+        };
+        let layers = vec![
+            rgb("radiance", &radiance),
+            rgb("sun", &l.sun),
+            rgb("sky", &l.sky),
+            layer("depth", vec![("Z", FlatSamples::F32(l.depth.clone()))]),
+            layer("trees", vec![("coverage", FlatSamples::F32(l.coverage.clone()))]),
+            layer("species", vec![("id", FlatSamples::U32(l.species.clone()))]),
+        ];
+        let attributes =
+            exr::prelude::ImageAttributes::new(exr::prelude::IntegerBounds::from_dimensions(size));
+        let image = ExrImage::from_layers(attributes, layers);
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        // One thread: blocks then stand in the same order in every file.
+        image
+            .write()
+            .non_parallel()
+            .to_buffered(&mut bytes)
+            .map_err(|e| Error::io(path, std::io::Error::other(e)))?;
+        write_whole(path, bytes.get_ref())
+    }
+}
+
+/// Writes a file as a whole or not at all: beside its place, synchronised, then renamed.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let name = path.file_name().ok_or_else(|| Error::Usage(format!("{} is no file name", path.display())))?;
+    let mut beside = std::ffi::OsString::from(".");
+    beside.push(name);
+    beside.push(format!(".{}", std::process::id()));
+    let beside = path.with_file_name(beside);
+    let written = (|| {
+        let mut file = std::fs::File::create(&beside)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        std::fs::rename(&beside, path)
+    })();
+    written.map_err(|e| {
+        // Best effort: the write has failed already.
+        let _ = std::fs::remove_file(&beside);
+        Error::io(path, e)
+    })
+}

@@ -1,0 +1,353 @@
+//! What a scene requires: every table, view set, cache, target and pass, with the reason and the bytes, before anything
+//! is allocated. What no one needs is not in the plan, and is not built.
+
+use crate::forest::pattern::Pattern;
+use crate::forest::seeds::fullest_listed;
+use crate::frame::camera::Eye;
+use crate::gpu::DeviceInfo;
+use crate::gpu::interface as gpu;
+use crate::physics::light::sun_disc_fraction;
+use crate::physics::views;
+use crate::scene::{Albedo, Camera, Distribution, Scene, Sky};
+use crate::{Error, Result};
+
+/// Points of a Wang tile.
+const PATTERN_POINTS: u32 = 256;
+/// Seed quads along the range, at most: more would not fit the page table.
+const QUADS_IN_RANGE: f64 = 24.0;
+/// Storage buffers that every Vulkan device binds, when no device is known.
+const ASSUMED_STORAGE: u64 = 128 << 20;
+
+/// One thing that the scene requires.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Item {
+    /// `data`, `cache`, `target` or `pass`.
+    pub kind: &'static str,
+    /// Name, as in captures and reports.
+    pub name: String,
+    /// What needs it.
+    pub reason: String,
+    /// Device memory, bytes.
+    pub bytes: u64,
+}
+
+/// What will be built and drawn.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Plan {
+    /// Everything, in the order of building.
+    pub items: Vec<Item>,
+    /// Image size, pixels.
+    pub size: [u32; 2],
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Layers of the image apart: sun, sky, coverage, species.
+    pub layers: bool,
+    /// Shadow cascades; 0 without sun.
+    pub cascades: u32,
+    /// Distance that the cascades reach, m.
+    pub shadow_distance: f64,
+    /// Distance to which each species is drawn tree by tree, for scale 1, m.
+    pub species_range: Vec<f64>,
+    /// The largest of these for any tree, m; 0 without trees.
+    pub range: f64,
+    /// Height of the tallest tree, m.
+    pub tallest: f64,
+    /// Side of a seed quad, m.
+    pub quad_side: f64,
+    /// Side of a Wang tile, m.
+    pub tile_side: f64,
+    /// Wang tiles along a seed quad.
+    pub tiles_per_quad: u32,
+    /// Points of the pattern per m².
+    pub pattern_density: f64,
+    /// Regions of the seed buffer.
+    pub seed_regions: u32,
+    /// Seeds a region.
+    pub region_capacity: u32,
+    /// Trees drawn one by one, at most.
+    pub tree_capacity: u32,
+    /// Terrain tiles.
+    pub terrain_tiles: u32,
+    /// Texels a side of a coverage tile.
+    pub coverage_size: u32,
+    /// The point pattern, if any density needs it.
+    #[serde(skip)]
+    pub pattern: Option<Pattern>,
+}
+
+impl Plan {
+    /// Plans an image of a scene.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when the plan exceeds the device's limits or the memory budget; it names the largest items.
+    pub fn new(
+        scene: &Scene,
+        camera: &Camera,
+        size: [u32; 2],
+        layers: bool,
+        device: Option<&DeviceInfo>,
+    ) -> Result<Self> {
+        let s = &scene.settings;
+        let eye = Eye::new(camera, &scene.terrain, size);
+        let has_sun =
+            sun_disc_fraction(scene.sun.elevation) > 0.0 && scene.sun.irradiance.iter().any(|e| *e > 0.0);
+        let mut plan = Plan {
+            items: Vec::new(),
+            size,
+            samples: samples(s.samples, device),
+            layers,
+            cascades: if has_sun { s.cascades } else { 0 },
+            shadow_distance: 0.0,
+            species_range: Vec::new(),
+            range: 0.0,
+            tallest: 0.0,
+            quad_side: 1.0,
+            tile_side: 1.0,
+            tiles_per_quad: 1,
+            pattern_density: 0.0,
+            seed_regions: 1,
+            region_capacity: gpu::CULL_GROUP,
+            tree_capacity: 1,
+            terrain_tiles: if scene.terrain.heights.is_some() { 1024 } else { 1 },
+            coverage_size: s.coverage_size,
+            pattern: None,
+        };
+        if scene.species.len() > gpu::MAX_SPECIES as usize {
+            return Err(Error::Usage(format!(
+                "{} species; at most {} fit a scene",
+                scene.species.len(),
+                gpu::MAX_SPECIES
+            )));
+        }
+        plan.trees(scene, &eye, device);
+        let diagonal = scene.terrain.extent[0].hypot(scene.terrain.extent[1]);
+        plan.shadow_distance = match f64::from(s.shadow_distance) {
+            0.0 if plan.range > 0.0 => plan.range.min(diagonal + eye.position[2].abs()),
+            0.0 => diagonal,
+            chosen => chosen,
+        };
+        plan.list(scene);
+        plan.check(s.memory_mib, device)?;
+        Ok(plan)
+    }
+
+    /// Device memory of the whole plan, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.items.iter().map(|i| i.bytes).sum()
+    }
+
+    /// Trees: how far, in which quads, in how much memory.
+    fn trees(&mut self, scene: &Scene, eye: &Eye, device: Option<&DeviceInfo>) {
+        let s = &scene.settings;
+        let mut area_density = 0.0;
+        for species in &scene.species {
+            let height = species.mesh.positions.iter().map(|p| p[2]).fold(0.0, f32::max).max(1e-3);
+            let range = f64::from(height) * eye.pixels_at_1m / f64::from(s.zfield_min_pixels);
+            self.species_range.push(range);
+            let mut scale = f64::from(species.scale[1]);
+            match &species.distribution {
+                Distribution::Density { max_density, .. } => {
+                    self.pattern_density += f64::from(*max_density);
+                    area_density += f64::from(*max_density);
+                }
+                Distribution::Positions(list) => {
+                    let largest = list.iter().filter_map(|p| p.scale).fold(0.0, f32::max);
+                    scale = scale.max(f64::from(largest));
+                    area_density += list.len() as f64 / (scene.terrain.extent[0] * scene.terrain.extent[1]);
+                }
+            }
+            self.range = self.range.max(range * scale);
+            let reach = species.mesh.positions.iter().map(|p| p[0].hypot(p[1]).max(p[2])).fold(0.0, f32::max);
+            self.tallest = self.tallest.max(f64::from(reach) * scale);
+        }
+        if area_density <= 0.0 {
+            self.range = 0.0;
+            return;
+        }
+        if self.pattern_density > 0.0 {
+            let pattern = Pattern::new(PATTERN_POINTS, scene.seed);
+            self.tile_side = (pattern.mean_points() / self.pattern_density).sqrt();
+            self.tiles_per_quad = 4;
+            while self.range > QUADS_IN_RANGE * self.tile_side * f64::from(self.tiles_per_quad) {
+                self.tiles_per_quad *= 2;
+            }
+            self.quad_side = self.tile_side * f64::from(self.tiles_per_quad);
+            self.region_capacity = self.tiles_per_quad.pow(2) * pattern.max_points();
+            self.pattern = Some(pattern);
+        } else {
+            // About a thousand listed trees a quad, if they stood evenly.
+            self.quad_side = (1000.0 / area_density).sqrt().max(self.range / QUADS_IN_RANGE);
+            self.region_capacity = 0;
+        }
+        self.region_capacity =
+            (self.region_capacity + fullest_listed(scene, self.quad_side)).next_multiple_of(gpu::CULL_GROUP);
+        // Every quad within range, and a ring around them whose discs reach in; no more than exist or can be bound.
+        let storage = device.map_or(ASSUMED_STORAGE, |d| d.max_storage_bytes.min(1 << 30));
+        let across = |k: usize| {
+            let exist = (scene.terrain.extent[k] / self.quad_side).ceil().max(1.0);
+            (2.0 * ((self.range + self.tallest) / self.quad_side + 2.0).ceil() + 1.0).min(exist)
+        };
+        let region_bytes = u64::from(self.region_capacity) * size_of::<gpu::Seed>() as u64;
+        let most = (storage / region_bytes).min(device.map_or(2048, |d| d.max_layers).into()).max(1);
+        self.seed_regions = (across(0) * across(1)).min(most as f64) as u32;
+        let slots = u64::from(self.seed_regions) * u64::from(self.region_capacity);
+        self.tree_capacity = u64::from(s.zfield_max_trees)
+            .min(slots)
+            .min(storage / size_of::<gpu::Tree>() as u64)
+            .max(1) as u32;
+    }
+
+    /// Writes down every item.
+    fn list(&mut self, scene: &Scene) {
+        let s = &scene.settings;
+        let mut items = Vec::new();
+        let mut add = |kind, name: &str, reason: String, bytes: u64| {
+            items.push(Item { kind, name: name.into(), reason, bytes });
+        };
+        let size_of_raster = |w: u32, h: u32| u64::from(w) * u64::from(h) * 4;
+        if let Some(r) = &scene.terrain.heights {
+            add("data", "height map", "the terrain has relief".into(), size_of_raster(r.width, r.height));
+        }
+        if let Albedo::Image(t) = &scene.terrain.albedo {
+            add("data", "ground albedo", "the ground's albedo is an image".into(), size_of_raster(t.width, t.height));
+        }
+        if let Sky::LatLong { width, height, .. } = &scene.sky {
+            add("data", "sky image", "the sky is an image".into(), 2 * size_of_raster(*width, *height));
+        }
+        let tile = u64::from(gpu::TERRAIN_HEIGHTS).pow(2) * 4 + u64::from(gpu::TERRAIN_SLOPES).pow(2) * 8;
+        add(
+            "cache",
+            "terrain tiles",
+            format!("{} quads of heights and slopes", self.terrain_tiles),
+            u64::from(self.terrain_tiles) * tile,
+        );
+        let trees = self.range > 0.0;
+        if trees {
+            let views = u64::from(views::count(s.view_rings)) * u64::from(s.view_resolution).pow(2) * 4 * 4 / 3;
+            for species in &scene.species {
+                let reason = format!("species \"{}\" is drawn tree by tree", species.name);
+                add("data", &format!("z-field views of {}", species.name), reason, views);
+            }
+            let maps: Vec<_> = scene
+                .species
+                .iter()
+                .filter_map(|s| match &s.distribution {
+                    Distribution::Density { map: Some(m), .. } => Some(m),
+                    _ => None,
+                })
+                .collect();
+            if !maps.is_empty() {
+                let side = |f: fn(&crate::scene::Raster) -> u32| maps.iter().map(|m| f(m)).max().unwrap_or(1);
+                let bytes = size_of_raster(side(|m| m.width), side(|m| m.height)) * maps.len() as u64;
+                add("data", "density maps", format!("{} species have a density map", maps.len()), bytes);
+            }
+            if self.pattern.is_some() {
+                let reason = "densities thin a Poisson-disk pattern".to_string();
+                add("data", "point pattern", reason, 16 * 8 * u64::from(PATTERN_POINTS));
+            }
+            let slots = u64::from(self.seed_regions) * u64::from(self.region_capacity);
+            add(
+                "cache",
+                "seeds",
+                format!("{} quads of {:.0} m within {:.0} m", self.seed_regions, self.quad_side, self.range),
+                slots * size_of::<gpu::Seed>() as u64,
+            );
+            add(
+                "cache",
+                "coverage tiles",
+                "the ground is darker under trees".into(),
+                u64::from(self.seed_regions) * u64::from(self.coverage_size).pow(2) * 4,
+            );
+            let capacity = u64::from(self.tree_capacity);
+            add(
+                "target",
+                "trees and lists",
+                format!("up to {capacity} trees in a frame"),
+                capacity * (size_of::<gpu::Tree>() as u64 + 4 * u64::from(1 + gpu::MAX_CASCADES) + 24)
+                    + slots * 4
+                    + slots / u64::from(gpu::CULL_GROUP) * 4 * u64::from(gpu::TREE_LISTS),
+            );
+        }
+        if self.cascades > 0 {
+            add(
+                "target",
+                "shadow cascades",
+                format!("the sun is up: {} cascades to {:.0} m", self.cascades, self.shadow_distance),
+                u64::from(self.cascades) * u64::from(s.cascade_size).pow(2) * 8,
+            );
+        }
+        let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
+        let colour = if self.layers { 8 + 8 + 4 } else { 8 };
+        let multi = if self.samples > 1 { u64::from(self.samples) * (colour + 4) } else { 0 };
+        let reason = format!(
+            "{} x {} pixels of {} samples{}",
+            self.size[0],
+            self.size[1],
+            self.samples,
+            if self.layers { ", layers apart" } else { "" }
+        );
+        add("target", "image", reason, pixels * (multi + colour + 4 + 4));
+        let mut pass = |name: &str, reason: &str| add("pass", name, reason.into(), 0);
+        pass("terrain tiles", "new quads of terrain");
+        if trees {
+            pass("seeds", "new quads of trees");
+            pass("coverage tiles", "new quads of trees");
+            for name in ["cull", "prefix sums", "draw commands", "compact"] {
+                pass(name, "which trees are seen, in order");
+            }
+        }
+        if self.cascades > 0 {
+            pass("shadows", "the sun is up");
+        }
+        if matches!(scene.sky, Sky::LatLong { .. }) {
+            pass("sky", "the sky is an image");
+        }
+        pass("terrain", "the ground");
+        if trees {
+            pass("trees", "trees within range");
+        }
+        pass("tone map", "the picture for display");
+        self.items = items;
+    }
+
+    fn check(&self, budget_mib: u32, device: Option<&DeviceInfo>) -> Result<()> {
+        let budget = u64::from(budget_mib) << 20;
+        let largest = || {
+            let mut items: Vec<&Item> = self.items.iter().filter(|i| i.bytes > 0).collect();
+            items.sort_by_key(|i| std::cmp::Reverse(i.bytes));
+            let named: Vec<String> =
+                items.iter().take(3).map(|i| format!("{} ({} MiB)", i.name, i.bytes >> 20)).collect();
+            named.join(", ")
+        };
+        if self.bytes() > budget {
+            return Err(Error::Usage(format!(
+                "the plan takes {} MiB, more than memory_mib = {budget_mib}; the largest items: {}",
+                self.bytes() >> 20,
+                largest()
+            )));
+        }
+        let Some(d) = device else { return Ok(()) };
+        if self.bytes() > d.device_bytes {
+            return Err(Error::Usage(format!(
+                "the plan takes {} MiB; {} has {} MiB; the largest items: {}",
+                self.bytes() >> 20,
+                d.name,
+                d.device_bytes >> 20,
+                largest()
+            )));
+        }
+        if self.size.iter().any(|n| *n == 0 || *n > d.max_image_side) {
+            return Err(Error::Usage(format!(
+                "an image of {} x {} pixels; {} draws 1 to {} a side",
+                self.size[0], self.size[1], d.name, d.max_image_side
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// The largest supported number of samples up to the wanted one.
+fn samples(wanted: u32, device: Option<&DeviceInfo>) -> u32 {
+    let supported = device.map_or(0b1_0101, |d| d.sample_counts);
+    [8, 4, 1].into_iter().find(|n| *n <= wanted && supported & n != 0).unwrap_or(1)
+}
