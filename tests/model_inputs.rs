@@ -123,6 +123,21 @@ fn axes_and_transforms() {
 }
 
 #[test]
+fn texture_transforms_are_applied() {
+    let bytes = changed(|d, _| {
+        d["extensionsUsed"] = json!(["KHR_texture_transform"]);
+        let quarter = std::f32::consts::FRAC_PI_2;
+        d["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] =
+            json!({"KHR_texture_transform": {"offset": [10, 20], "rotation": quarter, "scale": [2, 3]}});
+    });
+    // (0, 1), (1, 1), (1, 0) and (0, 0) are scaled, turned by a quarter (u, v) -> (v, -u), and shifted.
+    let wanted = [[13.0, 20.0], [13.0, 18.0], [10.0, 18.0], [10.0, 20.0]];
+    for (uv, wanted) in read(&bytes).unwrap().uvs.iter().zip(wanted) {
+        assert!((0..2).all(|i| (uv[i] - wanted[i]).abs() < 1e-5f32), "{uv:?}, not {wanted:?}");
+    }
+}
+
+#[test]
 fn other_layouts_load() {
     for (what, change) in [
         (

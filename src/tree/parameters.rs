@@ -202,8 +202,8 @@ pub(super) fn of(preset: Preset) -> Parameters {
             ],
             leaves: Leaves {
                 count: 3.0,
-                length: 0.62,
-                width: 0.6,
+                length: 0.78,
+                width: 0.74,
                 down_angle: [38.0, 15.0],
                 rotate: [140.0, 30.0],
             },
