@@ -147,7 +147,17 @@ impl<'a> Builder<'a> {
         let normals =
             primitive.get(&gltf::Semantic::Normals).map(|a| read.normals(a, positions.len())).transpose()?;
         let uvs = primitive.get(&gltf::Semantic::TexCoords(uv_set));
-        let uvs = uvs.map(|a| read.uvs(a, positions.len())).transpose()?;
+        let mut uvs = uvs.map(|a| read.uvs(a, positions.len())).transpose()?;
+        if let Some(uvs) = &mut uvs {
+            materials::transform_uv(&primitive.material(), uvs);
+            if !uvs.iter().flatten().all(|c| c.is_finite()) {
+                return Err(self.error(
+                    place,
+                    "KHR_texture_transform makes texture coordinates infinite",
+                    "correct it",
+                ));
+            }
+        }
         let indices = primitive.indices().map(|a| read.indices(a, positions.len())).transpose()?;
         let indices = indices.unwrap_or_else(|| (0..positions.len() as u32).collect());
         let corners = triangles(mode, &indices).ok_or_else(|| {

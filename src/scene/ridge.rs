@@ -1,7 +1,7 @@
 //! The built-in terrain: forested ridges, the same on every machine.
 //!
 //! A ridged multifractal (Musgrave, in Ebert et al., "Texturing and Modeling", 2003, ch. 16) of gradient noise on an
-//! integer-hashed lattice: each octave is `(1 - |n|)²`, weighted by the octave before, so that detail gathers on crests.
+//! integer-hashed lattice: each octave is `(1 - a|n|)²`, weighted by the octave before, so that detail gathers on crests.
 
 use super::Raster;
 
@@ -12,8 +12,10 @@ pub const CELL_SIZE: f64 = 20.0;
 /// Heights span 0 to this, m.
 const RELIEF: f64 = 600.0;
 /// Size of the largest ridges, m.
-const WAVELENGTH: f64 = 3100.0;
+const WAVELENGTH: f64 = 1900.0;
 const OCTAVES: u32 = 6;
+/// How far crests are rounded, in units of the noise.
+const CREST: f64 = 0.1;
 /// Ratio of successive wavelengths; not 2, lest the lattices of the octaves coincide and show.
 const LACUNARITY: f64 = 2.13;
 
@@ -58,15 +60,17 @@ fn noise(x: f64, y: f64, octave: u32) -> f64 {
 fn ridged(x: f64, y: f64) -> f64 {
     let (mut sum, mut weight, mut amplitude, mut frequency) = (0.0, 1.0, 1.0, 1.0 / WAVELENGTH);
     // Ridges run south-west to north-east, as folded mountains do: the lattice is stretched along that diagonal.
-    let (along, across) = (0.45 * (x + y) * 0.707, (x - y) * 0.707);
+    let (along, across) = (0.5 * (x + y) * 0.707, (x - y) * 0.707);
     // A slow warp bends the crests.
     let warp = 500.0 * noise(along / 2600.0, across / 2600.0, 100);
     for octave in 0..OCTAVES {
         let n = noise((along + warp) * frequency, (across + warp) * frequency, octave);
-        let ridge = (1.0 - n.abs()).max(0.0).powi(2) * weight;
+        // Noise seldom comes near ±1: steepened, the folds fall to level valley floors; rounded, crests are no knives.
+        let fold = (n * n + CREST * CREST).sqrt() - CREST;
+        let ridge = (1.0 - 1.4 * fold).max(0.0).powi(2) * weight;
         sum += ridge * amplitude;
-        weight = (1.6 * ridge).clamp(0.0, 1.0);
-        amplitude *= 0.42;
+        weight = (1.2 * ridge).clamp(0.0, 1.0);
+        amplitude *= 0.3;
         frequency *= LACUNARITY;
     }
     sum

@@ -163,7 +163,7 @@ impl Grower<'_> {
     fn turn(&mut self, last: f64, rotate: [f64; 2], i: u32) -> f64 {
         let variation = self.random.around(rotate[1]);
         match rotate[0] {
-            side if side < 0.0 => 0.5 * if i % 2 == 0 { -side } else { side } + variation,
+            side if side < 0.0 => 0.5 * if i.is_multiple_of(2) { -side } else { side } + variation,
             step => last + step + variation,
         }
     }
@@ -181,7 +181,9 @@ impl Grower<'_> {
             // Sprays near the tip run on along the twig.
             let share = offset / twig.length;
             let frame = turned(start.frame, turn, down * (1.0 - 0.7 * share * share));
-            let scale = 1.0 + self.random.around(0.2);
+            // Short twigs, as at the top, bear small sprays, or a pointed crown would end blunt.
+            let small = (0.4 + twig.length / leaves.length).min(1.0);
+            let scale = small * (1.0 + self.random.around(0.2));
             self.skeleton.sprays.push(Spray { at: start.at, frame, scale });
         }
     }

@@ -64,6 +64,7 @@ pub(super) fn open(name: &Path, bytes: &[u8], folder: Option<&Path>) -> Result<(
         let place = format!("JSON line {}, column {}", e.line(), e.column());
         Error::input(name, place, e.to_string(), "export the model again")
     })?;
+    check_positions(name, &root)?;
     let document = gltf::Document::from_json(root).map_err(|e| invalid(name, e))?;
     let mut data = Vec::new();
     let mut total = 0u64;
@@ -103,6 +104,24 @@ pub(super) fn open(name: &Path, bytes: &[u8], folder: Option<&Path>) -> Result<(
         data.push(bytes);
     }
     Ok((document, Buffers { data, folder: folder.map(Path::to_path_buf) }))
+}
+
+/// That every POSITION names an accessor: the `gltf` crate's own validation looks its bounds up unchecked.
+fn check_positions(name: &Path, root: &json::Root) -> Result<()> {
+    let position = json::validation::Checked::Valid(json::mesh::Semantic::Positions);
+    for (m, mesh) in root.meshes.iter().enumerate() {
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
+            if let Some(index) = primitive.attributes.get(&position)
+                && index.value() >= root.accessors.len()
+            {
+                let what =
+                    format!("POSITION is accessors[{}]; there are {}", index.value(), root.accessors.len());
+                let place = format!("meshes[{m}].primitives[{p}]");
+                return Err(Error::input(name, place, what, "export the model again"));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The JSON and the binary chunk, if there is one. The header is checked before the `gltf` crate reads it, because that

@@ -28,7 +28,19 @@ pub(super) struct Materials<'a> {
 
 /// The set of texture coordinates that a material's base colour uses.
 pub(super) fn uv_set(material: &gltf::Material) -> u32 {
-    material.pbr_metallic_roughness().base_color_texture().map_or(0, |t| t.tex_coord())
+    let texture = material.pbr_metallic_roughness().base_color_texture();
+    texture.map_or(0, |t| t.texture_transform().and_then(|x| x.tex_coord()).unwrap_or(t.tex_coord()))
+}
+
+/// What KHR_texture_transform does to the coordinates of a material's base colour: scale, turn, shift.
+pub(super) fn transform_uv(material: &gltf::Material, uvs: &mut [[f32; 2]]) {
+    let texture = material.pbr_metallic_roughness().base_color_texture();
+    let Some(t) = texture.and_then(|t| t.texture_transform()) else { return };
+    let (sin, cos) = t.rotation().sin_cos();
+    for uv in uvs {
+        let [u, v] = [uv[0] * t.scale()[0], uv[1] * t.scale()[1]];
+        *uv = [cos * u + sin * v + t.offset()[0], cos * v - sin * u + t.offset()[1]];
+    }
 }
 
 fn name_of(material: &gltf::Material) -> String {
