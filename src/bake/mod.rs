@@ -101,9 +101,7 @@ pub fn bake_species(
     let surface = Surface::new(mesh)?;
     let solid: Vec<bool> =
         mesh.materials.iter().map(|m| !m.foliage && !m.double_sided && m.alpha_cutoff.is_none()).collect();
-    let progress = Progress::new("baking occlusion", Occlusion::vertices(&surface), quiet);
-    let occlusion = Occlusion::new(&surface, &solid, settings.occlusion_rays, &progress);
-    progress.finish();
+    let occlusion = Occlusion::new(&surface, &solid, settings.occlusion_rays, quiet);
     let count = crate::physics::views::count(settings.rings);
     let progress = Progress::new("baking views", u64::from(count), quiet);
     let field = views::draw(&surface, &occlusion, settings.rings, settings.resolution, &progress);
