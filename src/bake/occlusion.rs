@@ -9,6 +9,10 @@
 //! itself; solid bark does. A grid keeps the tent-weighted mean over the points around each vertex, and is
 //! interpolated in between. (Rays from the vertices themselves would see every leaf from beside it, and lose up
 //! to half of its sky to the leaf itself; some vertices would lie inside the wood.)
+//!
+//! Against 2,048 rays from the very point, on leaves seen from one side: rms error 0.07 and bias −0.005 on the
+//! oak (mean 0.38), 0.10 and −0.04 on the pine (mean 0.39), nearly all of it the grid's smoothing: 56 cells
+//! instead of 96 give 0.09 and 0.13, four times the rays give the same.
 
 use std::f32::consts::TAU;
 
@@ -20,7 +24,7 @@ use super::surface::Surface;
 use crate::progress::Progress;
 
 /// Grid cells along the longest side of the tree.
-const CELLS: u32 = 56;
+const CELLS: u32 = 96;
 /// Points measured in a cell, at most.
 const POINTS: u32 = 4;
 /// Points tried on a surface as large as a cell's side, before masks and the choice of [`POINTS`].
@@ -280,7 +284,7 @@ mod tests {
     fn interpolation_agrees_with_rays_from_the_surface() {
         // A ball of 400 random cards.
         let mut mesh = Mesh { materials: vec![material()], ..Mesh::default() };
-        let random = |i: u32| sky_direction(i % 97, 97, i) * if i % 2 == 0 { 1.0 } else { -1.0 };
+        let random = |i: u32| sky_direction(i % 97, 97, i) * if i.is_multiple_of(2) { 1.0 } else { -1.0 };
         for i in 0..400 {
             let center = random(i) * 4.0 * ((i as f32 + 1.0) / 400.0).cbrt() + Vec3::Z * 5.0;
             let a = random(1000 + i).cross(Vec3::X).normalize() * 0.6;
