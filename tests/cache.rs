@@ -44,11 +44,15 @@ fn damage_anywhere_is_found_and_repaired() {
     let (good, _) = get(dir.path());
     let path = cache::path(dir.path(), &cache::key(&tree(), &OpticsOverride::default(), &SMALL));
     let whole = fs::read(&path).unwrap();
-    let flipped = (0..whole.len()).step_by(97).chain(0..96).chain(whole.len() - 40..whole.len()).map(|at| {
-        let mut bytes = whole.clone();
-        bytes[at] ^= 0x10;
-        (format!("bit at {at}"), bytes)
-    });
+    let flipped = (0..whole.len())
+        .step_by(499)
+        .chain((0..96).step_by(7))
+        .chain((whole.len() - 40..whole.len()).step_by(7))
+        .map(|at| {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 0x10;
+            (format!("bit at {at}"), bytes)
+        });
     let cut =
         [0, 1, 7, 50, whole.len() / 2, whole.len() - 1].map(|n| (format!("cut at {n}"), whole[..n].to_vec()));
     let longer = ("longer".to_string(), [&whole[..], &[0]].concat());

@@ -63,7 +63,7 @@ pub struct BakeSettings {
     pub rings: u32,
     /// Texels a side of a view: a power of two, 16 to 512.
     pub resolution: u32,
-    /// Rays a grid vertex for ambient occlusion, at least 1.
+    /// Rays for ambient occlusion in each of the grid's cells with a surface in it, at least 1.
     pub occlusion_rays: u32,
 }
 
