@@ -5,10 +5,12 @@
 //! believed about lengths: a file of another size is not read. Files are written under a name of their own and
 //! renamed when complete, so that two processes at once, or a crash, leave either a whole file or none.
 
+use std::collections::hash_map::RandomState;
 use std::fs::{self, File, OpenOptions};
+use std::hash::{BuildHasher, Hasher};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::{BakeSettings, SpeciesBake, ZField, bake_species, check};
 use crate::Result;
@@ -218,12 +220,12 @@ impl Drop for Temporary {
 }
 
 fn write(dir: &Path, path: &Path, key: &[u8; 32], bake: &SpeciesBake) -> io::Result<()> {
-    static COUNT: AtomicU64 = AtomicU64::new(0);
     fs::create_dir_all(dir)?;
-    let mine = format!("tmp-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
-    let temporary = Temporary(path.with_extension(mine));
-    // Not create_new: a file of this name can only be what a crashed process of the same number left.
-    let mut file = OpenOptions::new().write(true).create(true).truncate(true).open(&temporary.0)?;
+    // A random name: process numbers repeat between containers that share a directory.
+    let mine = format!("tmp-{:016x}", RandomState::new().build_hasher().finish());
+    let temporary = path.with_extension(mine);
+    let mut file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
+    let temporary = Temporary(temporary);
     let mut hasher = blake3::Hasher::new();
     let header = header(key, &scalars(bake));
     for part in std::iter::once(&header[..]).chain(bake.views.levels.iter().map(Vec::as_slice)) {

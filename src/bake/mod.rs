@@ -65,7 +65,7 @@ pub struct BakeSettings {
     pub rings: u32,
     /// Texels a side of a view: a power of two, 16 to 512.
     pub resolution: u32,
-    /// Rays a grid vertex for ambient occlusion, at least 1.
+    /// Rays for ambient occlusion in each of the grid's cells with a surface in it, at least 1.
     pub occlusion_rays: u32,
 }
 
@@ -103,9 +103,7 @@ pub fn bake_species(
     let surface = Surface::new(mesh)?;
     let solid: Vec<bool> =
         mesh.materials.iter().map(|m| !m.foliage && !m.double_sided && m.alpha_cutoff.is_none()).collect();
-    let progress = Progress::new("baking occlusion", Occlusion::vertices(&surface), quiet);
-    let occlusion = Occlusion::new(&surface, &solid, settings.occlusion_rays, &progress);
-    progress.finish();
+    let occlusion = Occlusion::new(&surface, &solid, settings.occlusion_rays, quiet);
     let count = crate::physics::views::count(settings.rings);
     let progress = Progress::new("baking views", u64::from(count), quiet);
     let field = views::draw(&surface, &occlusion, settings.rings, settings.resolution, &progress);

@@ -1,12 +1,13 @@
 //! Rays against a tree's surface, through the leaf masks.
 //!
 //! The `bvh` crate builds the hierarchy; it is walked here as a flat list, because the crate's own iterators
-//! either collect every leaf a ray's box touches or keep a stack of 32 nodes that a degenerate mesh overflows.
+//! either collect every leaf that a ray's box touches or keep a stack of 32 nodes, which a degenerate mesh
+//! overflows.
 
 use bvh::aabb::{Aabb, Bounded};
 use bvh::bounding_hierarchy::BHShape;
 use bvh::bvh::Bvh;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use super::surface::Surface;
 
@@ -48,17 +49,6 @@ pub struct Rays<'a> {
     nodes: Vec<Node>,
 }
 
-/// Where a ray meets a face.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
-    /// Ray parameter.
-    pub t: f32,
-    /// Index of the face.
-    pub face: u32,
-    /// The ray meets the face's back: its corners run clockwise as the ray sees them.
-    pub back: bool,
-}
-
 impl<'a> Rays<'a> {
     /// Builds the hierarchy.
     pub fn new(surface: &'a Surface) -> Self {
@@ -78,43 +68,14 @@ impl<'a> Rays<'a> {
         Rays { surface, corners, nodes }
     }
 
-    /// Whether anything stands on the ray beyond `t_min` (any unit).
+    /// Whether any surface lies on the ray beyond the parameter `t_min`.
     pub fn occluded(&self, origin: Vec3, direction: Vec3, t_min: f32) -> bool {
-        let mut hit = false;
-        self.walk(origin, direction, t_min, |_| {
-            hit = true;
-            f32::NEG_INFINITY
-        });
-        hit
-    }
-
-    /// The first surface on the ray beyond `t_min`.
-    pub fn closest(&self, origin: Vec3, direction: Vec3, t_min: f32) -> Option<Hit> {
-        let mut best = None;
-        self.walk(origin, direction, t_min, |hit| {
-            best = Some(hit);
-            hit.t
-        });
-        best
-    }
-
-    /// Whether the face belongs to a solid material.
-    pub fn is_solid(&self, face: u32, solid: &[bool]) -> bool {
-        solid[self.surface.faces[face as usize].material as usize]
-    }
-
-    /// Reports hits to `found`, which answers with the largest parameter still of interest.
-    fn walk(&self, origin: Vec3, direction: Vec3, t_min: f32, mut found: impl FnMut(Hit) -> f32) {
         let inverse = direction.recip();
-        let mut t_max = f32::INFINITY;
         let mut index = 0;
         while let Some(node) = self.nodes.get(index) {
             if node.face != u32::MAX {
-                if let Some(hit) = self.hit(node.face, origin, direction, t_min, t_max) {
-                    t_max = found(hit);
-                    if t_max < t_min {
-                        return;
-                    }
+                if self.hits(node.face, origin, direction, t_min) {
+                    return true;
                 }
                 index += 1;
                 continue;
@@ -122,37 +83,30 @@ impl<'a> Rays<'a> {
             // Slabs. A ray in the plane of a slab gives 0·∞ = NaN, which min and max pass over.
             let (t0, t1) = ((node.low - origin) * inverse, (node.high - origin) * inverse);
             let (near, far) = (t0.min(t1).max_element(), t0.max(t1).min_element());
-            let enters = near <= far * (1.0 + 4.0 * f32::EPSILON) && far >= t_min && near <= t_max;
+            let enters = near <= far * (1.0 + 4.0 * f32::EPSILON) && far >= t_min;
             index = if enters { index + 1 } else { node.exit as usize };
         }
+        false
     }
 
     /// Möller and Trumbore's intersection, then the mask.
-    fn hit(&self, face: u32, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Option<Hit> {
+    fn hits(&self, face: u32, origin: Vec3, direction: Vec3, t_min: f32) -> bool {
         let [a, b, c] = self.corners[face as usize];
         let (e1, e2) = (b - a, c - a);
         let p = direction.cross(e2);
         let det = e1.dot(p);
         if det == 0.0 {
-            return None;
+            return false;
         }
         let inverse = 1.0 / det;
         let s = origin - a;
         let u = s.dot(p) * inverse;
-        if !(0.0..=1.0).contains(&u) {
-            return None;
-        }
         let q = s.cross(e1);
         let v = direction.dot(q) * inverse;
-        if v < 0.0 || u + v > 1.0 {
-            return None;
-        }
-        let t = e2.dot(q) * inverse;
-        if !(t > t_min && t < t_max) {
-            return None;
+        if u < 0.0 || v < 0.0 || u + v > 1.0 || e2.dot(q) * inverse <= t_min {
+            return false;
         }
         let f = &self.surface.faces[face as usize];
-        let uv: Vec2 = f.uv[0] * (1.0 - u - v) + f.uv[1] * u + f.uv[2] * v;
-        self.surface.opaque(f, uv).then_some(Hit { t, face, back: det < 0.0 })
+        self.surface.opaque(f, f.uv[0] * (1.0 - u - v) + f.uv[1] * u + f.uv[2] * v)
     }
 }

@@ -41,12 +41,12 @@ impl Frame {
     }
 
     /// Into scaled tree space.
-    pub fn to_scaled(&self, p: Vec3) -> Vec3 {
+    pub fn to_scaled(self, p: Vec3) -> Vec3 {
         (p - Vec3::Z * self.center) / self.scale()
     }
 
     /// Into metres about the trunk's base.
-    pub fn to_metres(&self, p: Vec3) -> Vec3 {
+    pub fn to_metres(self, p: Vec3) -> Vec3 {
         p * self.scale() + Vec3::Z * self.center
     }
 }

@@ -113,9 +113,9 @@ pub fn lookup(n: u32, w: DVec3) -> Lookup {
     let (fa, fb) = (fi.abs() - a0, fj.abs() - b0);
     let (a0, b0) = (a0 as i32, b0 as i32);
     let corners = if fa + fb <= 1.0 {
-        [(a0, b0, 1.0 - fa - fb), (a0 + 1, b0, fa), (a0, b0 + 1, fb)]
+        [(a0, b0, (1.0 - fa - fb).max(0.0)), (a0 + 1, b0, fa), (a0, b0 + 1, fb)]
     } else {
-        [(a0 + 1, b0 + 1, fa + fb - 1.0), (a0, b0 + 1, 1.0 - fa), (a0 + 1, b0, 1.0 - fb)]
+        [(a0 + 1, b0 + 1, (fa + fb - 1.0).max(0.0)), (a0, b0 + 1, 1.0 - fa), (a0 + 1, b0, 1.0 - fb)]
     };
     // Corners beyond the horizon have no weight but for rounding: they take the place of the heaviest.
     let valid = |&(a, b, _): &(i32, i32, f64)| a + b <= n as i32;
@@ -123,7 +123,8 @@ pub fn lookup(n: u32, w: DVec3) -> Lookup {
         corners.into_iter().filter(valid).fold((0, 0, -1.0), |best, c| if c.2 > best.2 { c } else { best });
     let sum: f64 = corners.iter().filter(|c| valid(c)).map(|c| c.2).sum();
     let views = corners.map(|c| {
-        let (a, b, weight) = if valid(&c) { (c.0, c.1, c.2 / sum) } else { (heaviest.0, heaviest.1, 0.0) };
+        let (a, b, weight) =
+            if valid(&c) { (c.0, c.1, (c.2 / sum).min(1.0)) } else { (heaviest.0, heaviest.1, 0.0) };
         WeightedView { i: si * a, j: sj * b, weight }
     });
     Lookup { views, below }
