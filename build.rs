@@ -108,7 +108,13 @@ fn options(root: &Path, reflect: bool) -> Fallible<shaderc::CompileOptions<'stat
 }
 
 /// Compiles and reflects one shader; writes its SPIR-V and returns its `static` in Rust.
-fn shader(compiler: &shaderc::Compiler, name: &str, path: &Path, root: &Path, out: &Path) -> Fallible<String> {
+fn shader(
+    compiler: &shaderc::Compiler,
+    name: &str,
+    path: &Path,
+    root: &Path,
+    out: &Path,
+) -> Fallible<String> {
     let text = fs::read_to_string(path)?;
     let (kind, stage) = match path.extension().and_then(|e| e.to_str()) {
         Some("vert") => (shaderc::ShaderKind::Vertex, "VERTEX"),
@@ -125,7 +131,9 @@ fn shader(compiler: &shaderc::Compiler, name: &str, path: &Path, root: &Path, ou
     let mut bindings = Vec::new();
     for b in module.enumerate_descriptor_bindings(None)? {
         if b.set != 0 {
-            return Err(format!("{name}: binding {} is in set {}; every binding is in set 0", b.name, b.set).into());
+            return Err(
+                format!("{name}: binding {} is in set {}; every binding is in set 0", b.name, b.set).into()
+            );
         }
         let kind = match b.descriptor_type {
             ReflectDescriptorType::StorageBuffer => "STORAGE_BUFFER",
@@ -135,7 +143,9 @@ fn shader(compiler: &shaderc::Compiler, name: &str, path: &Path, root: &Path, ou
             other => return Err(format!("{name}: binding {} has an unused kind {other:?}", b.name).into()),
         };
         if b.name.is_empty() {
-            return Err(format!("{name}: binding {} needs an instance name: callers bind by it", b.binding).into());
+            return Err(
+                format!("{name}: binding {} needs an instance name: callers bind by it", b.binding).into()
+            );
         }
         bindings.push((b.binding, b.name.clone(), kind));
     }
@@ -149,7 +159,10 @@ fn shader(compiler: &shaderc::Compiler, name: &str, path: &Path, root: &Path, ou
     writeln!(rust, "    spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{stem}.spv\")),")?;
     writeln!(rust, "    bindings: &[")?;
     for (binding, name, kind) in bindings {
-        writeln!(rust, "        Binding {{ binding: {binding}, name: {name:?}, kind: vk::DescriptorType::{kind} }},")?;
+        writeln!(
+            rust,
+            "        Binding {{ binding: {binding}, name: {name:?}, kind: vk::DescriptorType::{kind} }},"
+        )?;
     }
     writeln!(rust, "    ],\n}};")?;
     Ok(rust)
@@ -185,13 +198,18 @@ fn structs(compiler: &shaderc::Compiler, text: &str, root: &Path) -> Fallible<St
             };
             let doc = note.trim().trim_start_matches("//").trim();
             let doc = if doc.is_empty() { docs.join(" ") } else { doc.to_string() };
-            writeln!(rust, "/// {doc}\n#[allow(clippy::excessive_precision)]\npub const {name}: {ty} = {value};")?;
+            writeln!(
+                rust,
+                "/// {doc}\n#[allow(clippy::excessive_precision)]\npub const {name}: {ty} = {value};"
+            )?;
             docs.clear();
         } else {
             docs.clear();
         }
     }
-    let mut probe = String::from("#version 450\n#extension GL_GOOGLE_include_directive : require\n#include \"interface.glsl\"\n");
+    let mut probe = String::from(
+        "#version 450\n#extension GL_GOOGLE_include_directive : require\n#include \"interface.glsl\"\n",
+    );
     for (k, (name, _)) in names.iter().enumerate() {
         writeln!(probe, "layout(std430, set = 0, binding = {k}) buffer B{k} {{ {name} items[]; }} b{k};")?;
     }
@@ -223,7 +241,10 @@ fn emit(
     size: u32,
     text: &str,
 ) -> Fallible<()> {
-    writeln!(rust, "/// {doc}\n#[repr(C)]\n#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]")?;
+    writeln!(
+        rust,
+        "/// {doc}\n#[repr(C)]\n#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]"
+    )?;
     writeln!(rust, "pub struct {name} {{")?;
     let (mut at, mut pads, mut checks) = (0, 0, String::new());
     let pad = |rust: &mut String, at: u32, to: u32, pads: &mut u32| -> Fallible<()> {
@@ -258,7 +279,11 @@ fn emit(
             bytes *= dim;
         }
         writeln!(rust, "    /// {}\n    pub {}: {rust_ty},", member_doc(text, name, &m.name), m.name)?;
-        writeln!(checks, "const _: () = assert!(core::mem::offset_of!({name}, {}) == {});", m.name, m.offset)?;
+        writeln!(
+            checks,
+            "const _: () = assert!(core::mem::offset_of!({name}, {}) == {});",
+            m.name, m.offset
+        )?;
         at = m.offset + bytes;
     }
     pad(rust, at, size, &mut pads)?;
@@ -274,8 +299,6 @@ fn member_doc(text: &str, name: &str, member: &str) -> String {
         .into_iter()
         .flat_map(str::lines)
         .filter_map(|l| l.split_once(';'))
-        .find(|(decl, _)| {
-            decl.split_whitespace().nth(1).is_some_and(|w| w.split('[').next() == Some(member))
-        })
+        .find(|(decl, _)| decl.split_whitespace().nth(1).is_some_and(|w| w.split('[').next() == Some(member)))
         .map_or(String::new(), |(_, note)| note.trim().trim_start_matches("//").trim().to_string())
 }

@@ -3,7 +3,9 @@
 use std::io::Write;
 use std::path::Path;
 
-use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image as ExrImage, Layer, LayerAttributes, WritableImage};
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image as ExrImage, Layer, LayerAttributes, WritableImage,
+};
 use half::f16;
 
 use crate::frame::camera::NEAR_PLANE;
@@ -50,9 +52,8 @@ impl Picture {
         let linear = plan.layers.then(|| -> Result<Linear> {
             let part = |k: usize| gpu.read_image::<[u16; 4]>(&targets.colors[k].image, 0, 0);
             let (sun, sky) = (part(0)?, part(1)?);
-            let rgb = |t: &[u16; 4]| {
-                [0, 1, 2].map(|k| (f64::from(f16::from_bits(t[k]).to_f32()) / scale) as f32)
-            };
+            let rgb =
+                |t: &[u16; 4]| [0, 1, 2].map(|k| (f64::from(f16::from_bits(t[k]).to_f32()) / scale) as f32);
             let depth = gpu.read_image::<f32>(&targets.depth.image, 0, 0)?;
             Ok(Linear {
                 sun: sun.iter().map(rgb).collect(),

@@ -191,10 +191,9 @@ impl Plan {
         let most = (storage / region_bytes).min(device.map_or(2048, |d| d.max_layers).into()).max(1);
         self.seed_regions = (across(0) * across(1)).min(most as f64) as u32;
         let slots = u64::from(self.seed_regions) * u64::from(self.region_capacity);
-        self.tree_capacity = u64::from(s.zfield_max_trees)
-            .min(slots)
-            .min(storage / size_of::<gpu::Tree>() as u64)
-            .max(1) as u32;
+        self.tree_capacity =
+            u64::from(s.zfield_max_trees).min(slots).min(storage / size_of::<gpu::Tree>() as u64).max(1)
+                as u32;
     }
 
     /// Writes down every item.
@@ -209,7 +208,12 @@ impl Plan {
             add("data", "height map", "the terrain has relief".into(), size_of_raster(r.width, r.height));
         }
         if let Albedo::Image(t) = &scene.terrain.albedo {
-            add("data", "ground albedo", "the ground's albedo is an image".into(), size_of_raster(t.width, t.height));
+            add(
+                "data",
+                "ground albedo",
+                "the ground's albedo is an image".into(),
+                size_of_raster(t.width, t.height),
+            );
         }
         if let Sky::LatLong { width, height, .. } = &scene.sky {
             add("data", "sky image", "the sky is an image".into(), 2 * size_of_raster(*width, *height));
@@ -223,7 +227,8 @@ impl Plan {
         );
         let trees = self.range > 0.0;
         if trees {
-            let views = u64::from(views::count(s.view_rings)) * u64::from(s.view_resolution).pow(2) * 4 * 4 / 3;
+            let views =
+                u64::from(views::count(s.view_rings)) * u64::from(s.view_resolution).pow(2) * 4 * 4 / 3;
             for species in &scene.species {
                 let reason = format!("species \"{}\" is drawn tree by tree", species.name);
                 add("data", &format!("z-field views of {}", species.name), reason, views);

@@ -58,8 +58,8 @@ fn extinction_of_a_dense_cloud_is_half_its_leaf_area_per_volume() {
     assert!((bake.crown_radius / radius - 1.0).abs() < 0.03);
     assert!((bake.height - 2.0 * radius).abs() < 0.2 && bake.crown_base < 1.5);
     // Material colour, twice halved: r + r/2.
-    for (albedo, color) in bake.albedo.iter().zip([0.4, 0.5, 0.2]) {
-        assert!((albedo - 1.5 * color).abs() < 1e-5, "{:?}", bake.albedo);
+    for (albedo, color) in bake.albedo().iter().zip([0.4, 0.5, 0.2]) {
+        assert!((albedo - 1.5 * color).abs() < 1e-5, "{:?}", bake.albedo());
     }
 }
 
@@ -77,7 +77,7 @@ fn masks_take_their_share_of_the_leaf_area() {
     // Half the leaf area, in an envelope that lies a longer free path inside the ball.
     assert!((0.5..0.7).contains(&(b.extinction / a.extinction)), "{} {}", a.extinction, b.extinction);
     // sRGB 188 is 0.5 linear.
-    assert!((b.albedo[1] / a.albedo[1] - 0.503).abs() < 0.01, "{:?} {:?}", a.albedo, b.albedo);
+    assert!((b.albedo()[1] / a.albedo()[1] - 0.503).abs() < 0.01, "{:?} {:?}", a.albedo(), b.albedo());
     // The same cards a second time, as backs with their corners the other way round, count once.
     let mut doubled = whole.clone();
     for t in whole.triangles.iter() {
@@ -100,11 +100,11 @@ fn stated_optics_win_and_trees_without_leaves_use_bark() {
     };
     let bake = bake_species(&mesh, &stated, &SMALL, true).unwrap();
     assert_eq!(bake.extinction, 0.7);
-    assert_eq!(bake.albedo, [0.1f32 + 0.05, 0.2, 0.3 + 0.1]);
+    assert_eq!(bake.albedo(), [0.1f32 + 0.05, 0.2, 0.3 + 0.1]);
     mesh.materials[0].foliage = false;
-    assert_eq!(bake_species(&mesh, &stated, &SMALL, true).unwrap().albedo, [0.15; 3]);
+    assert_eq!(bake_species(&mesh, &stated, &SMALL, true).unwrap().albedo(), [0.15; 3]);
     let bare = bake_species(&mesh, &OpticsOverride::default(), &SMALL, true).unwrap();
-    assert_eq!(bare.albedo, [0.4, 0.5, 0.2]);
+    assert_eq!(bare.albedo(), [0.4, 0.5, 0.2]);
 }
 
 #[test]

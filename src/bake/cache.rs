@@ -192,8 +192,22 @@ fn read(path: &Path, key: &[u8; 32], settings: &BakeSettings) -> io::Result<Spec
     if hasher.finalize() != checksum {
         return Err(damaged("the cached file is damaged (its checksum differs)"));
     }
-    let [center, radius, half_height, extinction, r0, r1, r2, t0, t1, t2, area, crown_radius, crown_base, height] =
-        x;
+    let [
+        center,
+        radius,
+        half_height,
+        extinction,
+        r0,
+        r1,
+        r2,
+        t0,
+        t1,
+        t2,
+        area,
+        crown_radius,
+        crown_base,
+        height,
+    ] = x;
     Ok(SpeciesBake {
         views: ZField { n: settings.rings, resolution: settings.resolution, levels },
         center,

@@ -46,6 +46,13 @@ pub struct SpeciesBake {
     pub height: f32,
 }
 
+impl SpeciesBake {
+    /// Leaf single-scattering albedo, linear RGB: reflectance + transmittance.
+    pub fn albedo(&self) -> [f32; 3] {
+        std::array::from_fn(|i| self.reflectance[i] + self.transmittance[i])
+    }
+}
+
 /// Depth views of one tree: a texture array with one layer a view and mip levels down to 1 × 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ZField {

@@ -7,8 +7,8 @@
 use super::seeds::SeedData;
 use super::species::SpeciesData;
 use crate::gpu::interface::{
-    CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, MAX_CASCADES, Seed, SeedQuad, Species, TREE_LISTS,
-    Tree, View,
+    CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, MAX_CASCADES, Seed, SeedQuad, Species,
+    TREE_LISTS, Tree, View,
 };
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, shaders};
 use crate::plan::Plan;
@@ -60,7 +60,8 @@ impl CullData {
         let slots = u64::from(plan.seed_regions) * u64::from(plan.region_capacity);
         let groups = slots / u64::from(CULL_GROUP);
         let trees = u64::from(plan.tree_capacity);
-        let constants = [(0, scene.settings.view_rings), (1, (scene.settings.view_resolution as f32).to_bits())];
+        let constants =
+            [(0, scene.settings.view_rings), (1, (scene.settings.view_resolution as f32).to_bits())];
         Ok(CullData {
             trees: gpu.buffer("trees", trees * size_of::<Tree>() as u64)?,
             lists: gpu.buffer("tree lists", trees * 4 * u64::from(1 + MAX_CASCADES))?,
@@ -161,8 +162,8 @@ pub fn classify(view: &View, species: &Species, centre: [f32; 3], scale: f32) ->
     for c in 0..view.cascade_count as usize {
         let plane = |k: usize| &view.cascade_planes[3 * c + k];
         let along = |k: usize| dot(&plane(k)[..3]) + view.cascade_centres[c][k];
-        let casts = (0..2).all(|k| along(k).abs() <= plane(k)[3] + radius)
-            && along(2) >= -(plane(2)[3] + radius);
+        let casts =
+            (0..2).all(|k| along(k).abs() <= plane(k)[3] + radius) && along(2) >= -(plane(2)[3] + radius);
         if casts {
             seen |= CLASS_CASCADE << c;
         }

@@ -136,9 +136,7 @@ mod tests {
 
     /// Points of an aperiodic tiling of n × n tiles.
     fn tiling(p: &Pattern, n: i32, seed: u32) -> Vec<[f64; 2]> {
-        let colour = |x: i32, y: i32, axis: u32| {
-            (hash2(seed + axis, hash2(x as u32, y as u32)) & 1) as usize
-        };
+        let colour = |x: i32, y: i32, axis: u32| (hash2(seed + axis, hash2(x as u32, y as u32)) & 1) as usize;
         let mut all = Vec::new();
         for y in 0..n {
             for x in 0..n {
@@ -147,7 +145,9 @@ mod tests {
                     | colour(x, y, 2) << 2
                     | colour(x + 1, y, 2) << 3;
                 all.extend(
-                    p.tiles[kind].iter().map(|q| [f64::from(q[0]) + f64::from(x), f64::from(q[1]) + f64::from(y)]),
+                    p.tiles[kind]
+                        .iter()
+                        .map(|q| [f64::from(q[0]) + f64::from(x), f64::from(q[1]) + f64::from(y)]),
                 );
             }
         }

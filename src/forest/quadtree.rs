@@ -160,7 +160,11 @@ impl Quadtree {
             }
             if quad.level + 1 < self.levels && bounds.distance(eye) < refine * side {
                 let (level, x, y) = (quad.level + 1, 2 * quad.x, 2 * quad.y);
-                open.extend([(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| QuadKey { level, x: x + i, y: y + j }));
+                open.extend([(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| QuadKey {
+                    level,
+                    x: x + i,
+                    y: y + j,
+                }));
             } else {
                 found.push(quad);
                 if found.len() > most {

@@ -11,7 +11,7 @@ use crate::gpu::interface::{
     CoverageTile, DrawCommand, GRID_SIDE, ListedTree, NO_PAGE, Seed, SeedParameters, SeedQuad,
 };
 use crate::gpu::{
-    Attachment, Blend, Buffer, DepthTest, GraphicsDesc, Gpu, Image, ImageDesc, Program, Recorder, Resource,
+    Attachment, Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource,
     Sampler, Targets, Topology, shaders, vk,
 };
 use crate::plan::Plan;
@@ -96,8 +96,10 @@ impl SeedData {
         let heights = scene.terrain.heights.is_some();
         Ok(SeedData {
             seeds: gpu.buffer("seeds", slots * size_of::<Seed>() as u64)?,
-            draws: gpu.buffer("seed draws", u64::from(plan.seed_regions) * size_of::<DrawCommand>() as u64)?,
-            quads: gpu.buffer("seed quads", 2 * u64::from(plan.seed_regions) * size_of::<SeedQuad>() as u64)?,
+            draws: gpu
+                .buffer("seed draws", u64::from(plan.seed_regions) * size_of::<DrawCommand>() as u64)?,
+            quads: gpu
+                .buffer("seed quads", 2 * u64::from(plan.seed_regions) * size_of::<SeedQuad>() as u64)?,
             visible_quads: Vec::new(),
             visible: 0,
             region_capacity: plan.region_capacity,
@@ -162,7 +164,14 @@ impl SeedData {
     ///
     /// # Errors
     /// [`Error::Usage`] when the view needs more quads than the plan holds.
-    pub fn update(&mut self, gpu: &Gpu, tree: &Quadtree, eye: &Eye, range: f64, reach: [f64; 3]) -> Result<SeedWork> {
+    pub fn update(
+        &mut self,
+        gpu: &Gpu,
+        tree: &Quadtree,
+        eye: &Eye,
+        range: f64,
+        reach: [f64; 3],
+    ) -> Result<SeedWork> {
         self.cache.begin_frame();
         self.visible = 0;
         self.visible_quads.clear();
@@ -278,7 +287,13 @@ impl SeedData {
     }
 
     /// Records the production of fresh seeds and coverage tiles.
-    pub fn produce(&self, recorder: &mut Recorder, work: &SeedWork, terrain: &TerrainData, species: &SpeciesData) {
+    pub fn produce(
+        &self,
+        recorder: &mut Recorder,
+        work: &SeedWork,
+        terrain: &TerrainData,
+        species: &SpeciesData,
+    ) {
         if work.fresh.1 > 0 {
             recorder.compute("seeds", |pass| {
                 pass.bind(
@@ -318,7 +333,8 @@ impl SeedData {
             ];
             pass.bind(&self.programs.1, &bound);
             for (quad, layer, _) in &work.tiles {
-                let tile = CoverageTile { layer: *layer, region: *layer, offset: [0.0; 2], side, quad: *quad };
+                let tile =
+                    CoverageTile { layer: *layer, region: *layer, offset: [0.0; 2], side, quad: *quad };
                 pass.push(&ExpectedCoverage { parameters: self.parameters, tile });
                 pass.draw(3, 1);
             }

@@ -116,7 +116,8 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Arc<SpeciesBake>], view_count: u32)
     let mut rows = Vec::new();
     for (k, (species, bake)) in scene.species.iter().zip(baked).enumerate() {
         let (mut max_density, mut between, mut slope) = (0.0, None, None);
-        if let Distribution::Density { max_density: d, between_heights, below_slope, .. } = &species.distribution
+        if let Distribution::Density { max_density: d, between_heights, below_slope, .. } =
+            &species.distribution
         {
             (max_density, between, slope) = (*d, *between_heights, *below_slope);
         }

@@ -96,7 +96,10 @@ impl TerrainData {
             height_tiles: tiles("height tiles", vk::Format::R32_SFLOAT, TERRAIN_HEIGHTS)?,
             slope_tiles: tiles("slope tiles", vk::Format::R16G16B16A16_SFLOAT, TERRAIN_SLOPES)?,
             // Each quad once for the camera, once a cascade, once when fresh.
-            quads: gpu.buffer("terrain quads", 6 * u64::from(plan.terrain_tiles) * size_of::<TerrainQuad>() as u64)?,
+            quads: gpu.buffer(
+                "terrain quads",
+                6 * u64::from(plan.terrain_tiles) * size_of::<TerrainQuad>() as u64,
+            )?,
             cache: SlotCache::new(plan.terrain_tiles),
             program: gpu.compute(&shaders::FOREST_TERRAIN_TILE_COMP, &[])?,
             refine: 0.0,
@@ -123,7 +126,13 @@ impl TerrainData {
     ///
     /// # Errors
     /// [`Error::Usage`] when the view needs more tiles than the plan holds even at the coarsest.
-    pub fn update(&mut self, gpu: &Gpu, eye: &Eye, cascades: &[Cascade], pixels: f64) -> Result<TerrainDraws> {
+    pub fn update(
+        &mut self,
+        gpu: &Gpu,
+        eye: &Eye,
+        cascades: &[Cascade],
+        pixels: f64,
+    ) -> Result<TerrainDraws> {
         let most = self.cache.capacity() as usize;
         let planes = eye.planes();
         let wanted = eye.pixels_at_1m / (f64::from(TERRAIN_CELLS) * pixels);

@@ -52,8 +52,7 @@ impl Eye {
 
     /// An eye at a world position, looking along a direction of any length (north where it has none).
     pub fn looking(position: [f64; 3], direction: [f64; 3], vertical_fov: f64, size: [u32; 2]) -> Self {
-        let forward =
-            if dot(direction, direction) > 0.0 { normalize(direction) } else { [0.0, 1.0, 0.0] };
+        let forward = if dot(direction, direction) > 0.0 { normalize(direction) } else { [0.0, 1.0, 0.0] };
         // Straight up or down there is no horizon to level: north is then up in the image.
         let across = cross(forward, [0.0, 0.0, 1.0]);
         let right = if dot(across, across) > 1e-20 { normalize(across) } else { [1.0, 0.0, 0.0] };

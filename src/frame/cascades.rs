@@ -45,7 +45,8 @@ pub fn cascades(
             let texel = 2.0 * half / f64::from(texels);
             let centre = add(eye.position, eye.forward, along);
             // Snapped in world coordinates, then taken relative to the eye again, all in doubles.
-            let snapped = |axis: [f64; 3]| (dot(axis, centre) / texel).floor() * texel - dot(axis, eye.position);
+            let snapped =
+                |axis: [f64; 3]| (dot(axis, centre) / texel).floor() * texel - dot(axis, eye.position);
             let centre = [snapped(axes[0]), snapped(axes[1]), snapped(axes[2])];
             let mut planes = Vec::new();
             for k in 0..2 {
@@ -111,11 +112,7 @@ mod tests {
         for c in &all {
             for k in 0..500 {
                 let (u, v) = (f64::from(k % 21) / 10.0 - 1.0, f64::from(k % 19) / 9.0 - 1.0);
-                let d = normalize(add(
-                    add(e.forward, e.right, u * e.tangents[0]),
-                    e.up,
-                    v * e.tangents[1],
-                ));
+                let d = normalize(add(add(e.forward, e.right, u * e.tangents[0]), e.up, v * e.tangents[1]));
                 let p = d.map(|x| x * (from + (c.far - from) * f64::from(k % 7) / 6.0));
                 for (axis, centre) in c.axes.iter().zip(c.centre) {
                     assert!((dot(*axis, p) - centre).abs() <= c.half + 1e-9);

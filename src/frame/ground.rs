@@ -7,8 +7,8 @@ use crate::forest::seeds::SeedData;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::gpu::interface::{GRID_SIDE, NO_PAGE, TERRAIN_CELLS, TERRAIN_HEIGHTS};
 use crate::gpu::{
-    Blend, Buffer, DepthTest, GraphicsDesc, Gpu, Image, ImageDesc, Program, Recorder, Resource, Sampler, Targets,
-    Topology, shaders, vk,
+    Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler,
+    Targets, Topology, shaders, vk,
 };
 use crate::plan::Plan;
 
@@ -30,7 +30,8 @@ impl Ground {
     pub fn new(gpu: &Gpu, plan: &Plan) -> Result<Self> {
         let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
         let side = TERRAIN_HEIGHTS;
-        let cells = (0..TERRAIN_CELLS * TERRAIN_CELLS).map(|k| (k % TERRAIN_CELLS) + side * (k / TERRAIN_CELLS));
+        let cells =
+            (0..TERRAIN_CELLS * TERRAIN_CELLS).map(|k| (k % TERRAIN_CELLS) + side * (k / TERRAIN_CELLS));
         // Diagonals run the same way at every level, so that a morphed quad is the coarser one exactly.
         let indices: Vec<u32> =
             cells.flat_map(|k| [k, k + 1, k + side + 1, k, k + side + 1, k + side]).collect();

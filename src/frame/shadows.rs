@@ -2,18 +2,18 @@
 
 use super::camera::Eye;
 use super::cascades::Cascade;
+use crate::Result;
 use crate::forest::cull::CullData;
 use crate::forest::seeds::SeedData;
 use crate::forest::species::SpeciesData;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::gpu::interface::{DrawCommand, TERRAIN_CELLS, TerrainParameters};
 use crate::gpu::{
-    Attachment, Blend, Buffer, DepthTest, GraphicsDesc, Gpu, Image, ImageDesc, Program, Recorder, Resource,
+    Attachment, Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource,
     Sampler, Targets, Topology, shaders, vk,
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::Result;
 
 /// Push constants of a terrain draw.
 #[repr(C)]

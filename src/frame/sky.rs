@@ -4,8 +4,8 @@ use super::targets::ImageTargets;
 use super::view::Light;
 use crate::Result;
 use crate::gpu::{
-    Blend, Buffer, DepthTest, GraphicsDesc, Gpu, Image, ImageDesc, Program, Recorder, Resource, Sampler, Targets,
-    Topology, shaders, vk,
+    Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler,
+    Targets, Topology, shaders, vk,
 };
 use crate::plan::Plan;
 use crate::scene::{Scene, Sky};

@@ -17,7 +17,13 @@ pub struct ColorTarget {
 }
 
 impl ColorTarget {
-    fn new(gpu: &Gpu, plan: &Plan, name: &str, format: vk::Format, usage: vk::ImageUsageFlags) -> Result<Self> {
+    fn new(
+        gpu: &Gpu,
+        plan: &Plan,
+        name: &str,
+        format: vk::Format,
+        usage: vk::ImageUsageFlags,
+    ) -> Result<Self> {
         let make = |samples| {
             gpu.image(&ImageDesc { name, format, size: plan.size, layers: 1, levels: 1, samples, usage })
         };

@@ -4,8 +4,8 @@ use super::Forest;
 use super::targets::ImageTargets;
 use crate::Result;
 use crate::gpu::{
-    Blend, Buffer, DepthTest, GraphicsDesc, Gpu, Image, Program, Recorder, Resource, Sampler, Targets, Topology,
-    shaders,
+    Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets,
+    Topology, shaders,
 };
 use crate::plan::Plan;
 use crate::scene::Scene;

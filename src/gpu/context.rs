@@ -53,7 +53,9 @@ pub(super) struct Shared {
 pub(super) fn load_entry() -> Result<ash::Entry> {
     // SAFETY: the Vulkan loader is a well-behaved library; nothing else runs in its initialisers.
     unsafe { ash::Entry::load() }.map_err(|e| {
-        Error::NoDevice(format!("no Vulkan loader ({e}); on Debian: apt-get install libvulkan1 mesa-vulkan-drivers"))
+        Error::NoDevice(format!(
+            "no Vulkan loader ({e}); on Debian: apt-get install libvulkan1 mesa-vulkan-drivers"
+        ))
     })
 }
 
@@ -228,11 +230,9 @@ fn open(
         let queue_info =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
         let extensions = [khr::push_descriptor::NAME.as_ptr()];
-        let mut f12 = vk::PhysicalDeviceVulkan12Features::default()
-            .timeline_semaphore(true)
-            .shader_output_layer(true);
-        let mut f13 =
-            vk::PhysicalDeviceVulkan13Features::default()
+        let mut f12 =
+            vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true).shader_output_layer(true);
+        let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
             .synchronization2(true)
             .dynamic_rendering(true)
             // glslang writes workgroup sizes as LocalSizeId.

@@ -136,7 +136,8 @@ impl Gpu {
     /// [`Error::Usage`] for sizes beyond the device's limits; [`Error::Device`] when out of memory.
     pub fn image(&self, d: &ImageDesc) -> Result<Image> {
         let (s, i) = (&self.shared, self.info());
-        if d.size.iter().any(|n| *n == 0 || *n > i.max_image_side) || d.layers == 0 || d.layers > i.max_layers {
+        if d.size.iter().any(|n| *n == 0 || *n > i.max_image_side) || d.layers == 0 || d.layers > i.max_layers
+        {
             return Err(Error::Usage(format!(
                 "image \"{}\" of {}x{}, {} layers: {} takes 1 to {} texels a side and {} layers",
                 d.name, d.size[0], d.size[1], d.layers, i.name, i.max_image_side, i.max_layers

@@ -193,9 +193,8 @@ impl Gpu {
             .layout(program.layout)
             .push_next(&mut rendering)];
         // SAFETY: modules, layout and every state struct are alive.
-        let made = unsafe {
-            self.shared.device.create_graphics_pipelines(vk::PipelineCache::null(), &create, None)
-        };
+        let made =
+            unsafe { self.shared.device.create_graphics_pipelines(vk::PipelineCache::null(), &create, None) };
         program.pipeline = made.map_err(|(_, e)| e).map_err(device_error(d.frag.name))?[0];
         self.shared.name(program.pipeline, d.frag.name);
         Ok(program)
@@ -233,8 +232,7 @@ impl Gpu {
             .collect();
         let stage_flags = stages.iter().fold(vk::ShaderStageFlags::empty(), |f, s| f | s.stage);
         let push_bytes = stages.iter().map(|s| s.push_constant_bytes).max().unwrap_or(0);
-        let ranges =
-            [vk::PushConstantRange::default().stage_flags(stage_flags).offset(0).size(push_bytes)];
+        let ranges = [vk::PushConstantRange::default().stage_flags(stage_flags).offset(0).size(push_bytes)];
         // SAFETY: the device is alive; the set layout outlives the pipeline layout.
         unsafe {
             let set = s

@@ -97,8 +97,8 @@ impl Gpu {
             let cmd = s.device.allocate_command_buffers(&allocate);
             let cmd = cmd.map_err(device_error("command buffer"))?[0];
             let recorder = Recorder { gpu: self, cmd, queries, passes: Vec::new(), error: None };
-            let begin = vk::CommandBufferBeginInfo::default()
-                .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+            let begin =
+                vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
             s.device.begin_command_buffer(cmd, &begin).map_err(device_error("recording"))?;
             s.device.cmd_reset_query_pool(cmd, queries, 0, 2 * MAX_PASSES);
             Ok(recorder)
@@ -337,8 +337,7 @@ impl Work<'_, '_> {
             .iter()
             .zip(buffers.iter().zip(&images))
             .map(|(b, (buffer, image))| {
-                let write =
-                    vk::WriteDescriptorSet::default().dst_binding(b.binding).descriptor_type(b.kind);
+                let write = vk::WriteDescriptorSet::default().dst_binding(b.binding).descriptor_type(b.kind);
                 if buffer[0].buffer == vk::Buffer::null() {
                     write.image_info(image)
                 } else {

@@ -43,7 +43,14 @@ impl Gpu {
     ///
     /// # Errors
     /// [`Error::Device`] if the device fails.
-    pub fn upload_image(&self, image: &Image, level: u32, first: u32, layers: u32, texels: &[u8]) -> Result<()> {
+    pub fn upload_image(
+        &self,
+        image: &Image,
+        level: u32,
+        first: u32,
+        layers: u32,
+        texels: &[u8],
+    ) -> Result<()> {
         let staging = self.staging(texels)?;
         let region = [copy_region(image, level, first, layers)];
         self.immediate(|device, cmd| {
@@ -121,9 +128,10 @@ impl Gpu {
         // SAFETY: the pool is used by one thread at a time (the recorder borrows the Gpu on this one); the command
         // buffer is freed only after the wait.
         unsafe {
-            let cmd = s.device.allocate_command_buffers(&allocate).map_err(device_error("command buffer"))?[0];
-            let begin = vk::CommandBufferBeginInfo::default()
-                .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+            let cmd =
+                s.device.allocate_command_buffers(&allocate).map_err(device_error("command buffer"))?[0];
+            let begin =
+                vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
             let recorded = s.device.begin_command_buffer(cmd, &begin).and_then(|()| {
                 super::record::barrier(&s.device, cmd);
                 record(&s.device, cmd);

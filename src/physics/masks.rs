@@ -15,9 +15,8 @@ pub type Row = [u32; 4];
 /// The combination table: rows in which column k runs through every combination of k of `samples` bits equally often,
 /// so that every sample is as likely as any other.
 pub fn combination_table(samples: u32) -> Vec<Row> {
-    let combinations: Vec<Vec<u32>> = (0..=samples)
-        .map(|k| (0u32..1 << samples).filter(|m| m.count_ones() == k).collect())
-        .collect();
+    let combinations: Vec<Vec<u32>> =
+        (0..=samples).map(|k| (0u32..1 << samples).filter(|m| m.count_ones() == k).collect()).collect();
     let rows = combinations.iter().map(Vec::len).fold(1, lcm);
     (0..rows)
         .map(|r| {

@@ -13,12 +13,7 @@ fn weights(f: f64) -> [f64; 4] {
 }
 
 fn slope_weights(f: f64) -> [f64; 4] {
-    [
-        -0.5 + f * (2.0 - 1.5 * f),
-        f * (4.5 * f - 5.0),
-        0.5 + f * (4.0 - 4.5 * f),
-        f * (1.5 * f - 1.0),
-    ]
+    [-0.5 + f * (2.0 - 1.5 * f), f * (4.5 * f - 5.0), 0.5 + f * (4.0 - 4.5 * f), f * (1.5 * f - 1.0)]
 }
 
 /// Height and its derivatives east and north per texel at a position in texels; samples outside repeat the border.
@@ -57,9 +52,8 @@ mod tests {
 
     fn raster(f: impl Fn(f64, f64) -> f64) -> Raster {
         let (width, height) = (9, 7);
-        let samples = (0..width * height)
-            .map(|k| f(f64::from(k % width), f64::from(k / width)) as f32)
-            .collect();
+        let samples =
+            (0..width * height).map(|k| f(f64::from(k % width), f64::from(k / width)) as f32).collect();
         Raster { width, height, samples }
     }
 
