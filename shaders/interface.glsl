@@ -40,7 +40,7 @@ struct View {
     float hotspot_width;              // a2 of BN12 eq. 8, 1/rad
     float ground_contrast;            // a3 of BN12 eq. 10
     float hole_radius;                // radius of the hole around a tree times sqrt(density), BN12 eq. 9
-    float mean_area;                  // mean horizontal area of a tree in the scene, m2
+    float range;                      // distance to which any tree is drawn one by one, m
     uint species_count;               // species in the scene
     uint samples;                     // samples a pixel
 };
@@ -65,6 +65,8 @@ struct Species {
     float height_softness;            // width of the smooth height limits, m
     vec2 map_size;                    // texels of its density map in use
     float slope_softness;             // width of the smooth slope limit, as a tangent
+    float crown_base;                 // height in scaled tree space under which there is only bark
+    vec3 bark;                        // reflectance of bark over albedo of leaves
     uint pad;                         // unused
 };
 

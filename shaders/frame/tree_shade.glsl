@@ -17,6 +17,7 @@ layout(location = 19) flat in vec4 sun;
 layout(location = 20) flat in vec4 sky;
 layout(location = 21) flat in uvec4 tree_bits;
 layout(location = 22) flat in float dither;
+layout(location = 23) flat in vec4 bark;
 
 layout(binding = 6) uniform sampler2DArray views;
 layout(binding = 7) uniform usampler2DArray shadow_map;
@@ -36,13 +37,19 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
     vec3 layers = vec3(view_c[0].w, view_c[1].w, view_c[2].w);
     bool below = (tree_bits.w >> 4u & 1u) != 0u;
     // All but the last iteration only move the point: one coarser mip, so that a small hole before the start does not end
-    // the search, and no filter. Trees of a few pixels, whose parallax between views is under a pixel, have none.
+    // the search, and no filter unless texels are magnified. Trees of a few pixels, whose parallax between views is under a
+    // pixel, have none. Two loops, because lavapipe skips loops without turns, but takes both sides of a branch.
     float start = 0.0;
-    uint estimates = tree_bits.w >> 16u;
+    Surface at;
+    uint estimates = tree_bits.w >> 16u & 255u, filtered = tree_bits.w >> 24u;
     for (uint k = 0u; k < estimates; k++) {
         start = zfield_estimate(views, p, d, inverse_depth, layers, w, optics.x + 1.0, start, below);
     }
-    Surface at = zfield_fetch(views, p, d, inverse_depth, layers, w, optics.x, start, below, estimates > 0u);
+    for (uint k = 0u; k < filtered; k++) {
+        at = zfield_fetch(views, p, d, inverse_depth, layers, w, optics.x + 1.0, start, below, k > 0u);
+        start = zfield_move(start, at.s, at.opacity);
+    }
+    at = zfield_fetch(views, p, d, inverse_depth, layers, w, optics.x, start, below, estimates + filtered > 0u);
     // Nothing behind the eye is seen: there s would be 1 or more.
     float s = clamp(at.s, -1e3, 0.999);
     float opacity = at.s < 0.999 ? at.opacity * optics.z : 0.0;
@@ -81,5 +88,9 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
     float height = mix(view_p[0].w, optics.w, s);
     float below_top = max(1.0 - height, 0.0) * sky.w;
     sky_part = sky.rgb * (at.occlusion / (1.0 + below_top * below_top * sun.w));
+    // Under the crown there is only bark; half a metre or so of transition.
+    vec3 colour = mix(bark.rgb, vec3(1.0), smoothstep(bark.w - 0.05, bark.w + 0.05, height));
+    sun_part *= colour;
+    sky_part *= colour;
     return (tree_bits.w >> 8u & 255u) + 1u;
 }

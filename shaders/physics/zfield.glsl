@@ -15,9 +15,13 @@ struct Surface {
 // Depth by which a view may disagree with the point found so far before it counts half.
 const float AGREEMENT = 0.15;
 
+// How far an estimate moves the point: all the way to a surface of a quarter's opacity, continuously less for less. A
+// faint texel must not decide where to look, or silhouettes follow the borders of texels.
+float zfield_move(float s, float estimate, float opacity) { return mix(s, estimate, min(4.0 * opacity, 1.0)); }
+
 // A first estimate of s: one unfiltered texel from each view at p + s d, outside the view its border. Each view's surface
 // is at s_i = (z_i - depth_i(p)) / depth_i(d); their mean is weighted by opacity, which premultiplied texels give without
-// a division each. inverse_depth is 1 / depth_i(d). Keeps s where nothing is.
+// a division each. inverse_depth is 1 / depth_i(d). Where little or nothing is, s stays: see zfield_move.
 float zfield_estimate(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_depth, vec3 layers, vec3 weights, float mip,
                       float s, bool farthest) {
     float sum_s = 0.0, opacity = 0.0;
@@ -30,7 +34,7 @@ float zfield_estimate(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_d
         sum_s += weights[i] * (z - t.a * p[i].z) * inverse_depth[i];
         opacity += weights[i] * t.a;
     }
-    return opacity > 0.0 ? sum_s / opacity : s;
+    return opacity > 0.0 ? zfield_move(s, sum_s / opacity, opacity) : s;
 }
 
 // The surface near q = p + s d, filtered. With `refine`, when q is more than the start of the search, a view whose surface

@@ -75,7 +75,6 @@ pub fn view(
     cascades: &[Cascade],
     seeds: Option<&SeedData>,
     terrain_step: f64,
-    mean_area: f64,
 ) -> View {
     let s = &scene.settings;
     let mut view: View = bytemuck::Zeroable::zeroed();
@@ -126,7 +125,7 @@ pub fn view(
     view.hotspot_width = s.hotspot_width;
     view.ground_contrast = s.ground_contrast;
     view.hole_radius = s.hole_radius;
-    view.mean_area = mean_area as f32;
+    view.range = plan.range.max(1.0) as f32;
     view.species_count = scene.species.len() as u32;
     view.samples = plan.samples;
     view
