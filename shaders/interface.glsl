@@ -11,7 +11,8 @@ const uint TERRAIN_SLOPES = 65u;      // slope samples along a side of a terrain
 const uint GRID_SIDE = 128u;          // side of the toroidal page table of seed quads
 const uint NO_PAGE = 0xffffffffu;     // a seed quad without region
 
-// Everything of a frame that does not depend on the object drawn. World positions are relative to the camera.
+// Everything of a frame that does not depend on the object drawn. World positions are relative to the camera. Bound as
+// a uniform block: arrays are of vec4 and mat4 only, so that std140 and std430 agree.
 struct View {
     mat4 clip_from_world;             // reverse Z, infinite far
     mat4 cascade_from_world[4];       // xy in [-1, 1]; z in [0, 1], 1 at the sun's side
@@ -72,6 +73,7 @@ struct ViewBasis {
     vec4 u;                           // texture u - 0.5 = dot(u, p)
     vec4 v;                           // texture v - 0.5 = dot(v, p)
     vec4 depth;                       // depth towards the viewer = dot(depth, p)
+    vec4 bounds;                      // of what the view shows: least and greatest p.right, then p.up
 };
 
 // One tree, as produced for a seed quad.

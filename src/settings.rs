@@ -66,7 +66,7 @@ knobs! {
     zfield_min_pixels: f32, "px", 0.25..=64.0, [4.0, 3.0, 2.0], "apparent tree height under which trees are no longer drawn one by one; cost grows with its inverse square";
     zfield_max_trees: u32, "", 1..=16000000, [1000000, 2000000, 4000000], "most trees drawn one by one; bounds memory";
     cascades: u32, "", 1..=4, [3, 4, 4], "shadow cascades; each draws the trees of its slice again";
-    cascade_size: u32, "texels", 64..=8192, [1024, 2048, 4096], "texels a side of a cascade; fill cost";
+    cascade_size: u32, "texels", 64..=8192, [512, 1024, 2048], "texels a side of a cascade; fill cost";
     cascade_split: f32, "", 0.0..=1.0, [0.8, 0.8, 0.8], "0 uniform, 1 logarithmic cascade ranges (parallel-split)";
     shadow_distance: f32, "m", 0.0..=1000000.0, [0.0, 0.0, 0.0], "range of the cascades; 0 is as far as trees are drawn one by one";
     coverage_size: u32, "texels", 32..=1024, [128, 256, 512], "texels a side of the coverage tile of a seed quad";

@@ -6,7 +6,7 @@
 #include "forest/cull.glsl"
 
 layout(local_size_x = 256) in;
-layout(std430, binding = 0) readonly buffer ViewBuffer { View v; } view;
+layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(std430, binding = 1) readonly buffer Quads { SeedQuad items[]; } quads;
 layout(std430, binding = 2) readonly buffer Draws { DrawCommand items[]; } draws;
 layout(std430, binding = 3) readonly buffer Seeds { Seed items[]; } seeds;

@@ -6,7 +6,7 @@ layout(location = 0) in vec3 position;
 layout(location = 1) in vec2 slope_at;
 layout(location = 2) flat in uint layer;
 
-layout(std430, binding = 0) readonly buffer ViewBuffer { View v; } view;
+layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 3) uniform sampler2DArray slope_tiles;
 layout(binding = 4) uniform sampler2DArray albedo;
 layout(binding = 5) uniform usampler2DArray shadow_map;

@@ -1,6 +1,6 @@
 // Sky radiance along a pixel's view ray, from a latitude-longitude image: row 0 at the zenith, column 0 at north.
 layout(location = 0) in vec2 clip;
-layout(std430, binding = 0) readonly buffer ViewBuffer { View v; } view;
+layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 1) uniform sampler2DArray sky;
 
 vec3 sky_radiance() {

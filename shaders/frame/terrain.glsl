@@ -1,7 +1,7 @@
 // Vertices of the terrain: a grid that morphs to the next coarser one with distance, so that levels meet without cracks
 // and change without popping. Positions are differences of whole finest-grid steps, equal to the bit in both quads.
 
-layout(std430, binding = 0) readonly buffer ViewBuffer { View v; } view;
+layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(std430, binding = 1) readonly buffer Quads { TerrainQuad items[]; } quads;
 layout(binding = 2) uniform sampler2DArray height_tiles;
 layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };

@@ -7,14 +7,16 @@
 #include "physics/zfield.glsl"
 #include "frame/tree_space.glsl"
 
-layout(std430, binding = 0) readonly buffer ViewBuffer { View v; } view;
+layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(std430, binding = 1) readonly buffer Trees { Tree items[]; } trees;
 layout(std430, binding = 2) readonly buffer Lists { uint items[]; } lists;
 layout(std430, binding = 3) readonly buffer SpeciesTable { Species items[]; } species;
 layout(std430, binding = 4) readonly buffer Bases { ViewBasis items[]; } bases;
 layout(std430, binding = 5) readonly buffer Masks { uvec4 items[]; } masks;
+layout(constant_id = 0) const int RINGS = 9;
 layout(constant_id = 1) const float RESOLUTION = 256.0;
 layout(constant_id = 2) const uint MASK_ROWS = 12u;
+layout(constant_id = 4) const uint VIEW_ITERATIONS = 2u;
 
 layout(location = 0) out vec4 view_p[3];        // in the three views; w of the first: height in the tree
 layout(location = 3) out vec3 light_p[3];
@@ -27,7 +29,7 @@ layout(location = 17) flat out vec4 weights;    // of two views, of two light vi
 layout(location = 18) flat out vec4 optics;     // mip, extinction, opacity factor, height of the eye in the tree
 layout(location = 19) flat out vec4 sun;        // w: 1 / r2 of the hole
 layout(location = 20) flat out vec4 sky;        // w: metres from the centre to the top
-layout(location = 21) flat out uvec4 tree_bits; // mask row; cascade | from below | species
+layout(location = 21) flat out uvec4 tree_bits; // mask row; cascade | from below << 4 | species << 8 | estimates << 16
 layout(location = 22) flat out float dither;
 
 void main() {
@@ -38,38 +40,33 @@ void main() {
     mat3 back = tree_rotation(t);
     vec3 c = (back * -t.centre) / half_extent;
 
-    // Extents of the cylinder r <= 1, |z| <= 1 seen from c on the plane through the centre: exact, from the corners of
-    // its section for the vertical, from its rims for the horizontal.
+    vec3 layers = unpack_layers(t.view_layers, kind.first_layer);
+    vec3 light_layers = unpack_layers(t.light_layers, kind.first_layer);
+    bool below = t.view_layers >> 31u != 0u;
+
+    // The quad lies on the plane through the centre across the view. From afar its extents are the tree's; near, points
+    // before the plane look larger by far / (far - depth), and depth is at most that of the cylinder.
     float far = max(length(c), 1e-6);
     vec3 w = c / far, right, up;
     frame_across(w, right, up);
-    float sine = length(w.xy), cosine = w.z;
-    vec2 vertical = vec2(1e9, -1e9);
-    for (int k = 0; k < 4; k++) {
-        vec2 corner = vec2((k & 1) == 0 ? -1.0 : 1.0, (k & 2) == 0 ? -1.0 : 1.0);
-        float depth = corner.x * sine + corner.y * cosine, across = corner.y * sine - corner.x * cosine;
-        float at = across * far / max(far - depth, 0.1 * far);
-        vertical = vec2(min(vertical.x, at), max(vertical.y, at));
-    }
-    float rim = far - abs(cosine);
-    float horizontal = far * inversesqrt(max(rim * rim - sine * sine, 0.01 * far * far));
-    // Half a texel of the mip in use and half a pixel, so that bilinear edges are not cut.
-    float margin = exp2(t.mip) / RESOLUTION + 0.5 * length(t.centre) / (v.pixels_at_1m * half_extent.x);
-    float margin_up = exp2(t.mip) / RESOLUTION * 1.5 + 0.5 * length(t.centre) / (v.pixels_at_1m * min(half_extent.x, half_extent.z));
+    float reach = length(w.xy) + abs(w.z);
+    vec4 extent = tree_bounds(bases.items[uint(layers.x)].bounds, bases.items[uint(layers.y)].bounds,
+                              bases.items[uint(layers.z)].bounds, w, below, RINGS);
+    extent *= far / max(far - reach, 0.1 * far);
+    // Half a texel of the mip in use, so that bilinear edges are not cut.
+    vec2 margin = exp2(t.mip) / RESOLUTION * vec2(1.0, reach);
     uint corner = gl_VertexIndex & 3u;
-    vec3 p = right * ((corner & 1u) == 0u ? -horizontal - margin : horizontal + margin) +
-             up * ((corner & 2u) == 0u ? vertical.x - margin_up : vertical.y + margin_up);
+    vec3 p = right * ((corner & 1u) == 0u ? extent.x - margin.x : extent.y + margin.x) +
+             up * ((corner & 2u) == 0u ? extent.z - margin.y : extent.w + margin.y);
     vec3 position = world_from_tree(t, kind, p);
     gl_Position = v.clip_from_world * vec4(position, 1.0);
 
     vec3 l = (back * v.sun_direction) / half_extent;
-    vec3 layers = unpack_layers(t.view_layers, kind.first_layer);
-    vec3 light_layers = unpack_layers(t.light_layers, kind.first_layer);
     for (int i = 0; i < 3; i++) {
-        ViewBasis b = bases.items[uint(layers[i]) - kind.first_layer];
+        ViewBasis b = bases.items[uint(layers[i])];
         view_p[i] = vec4(project(b, p), p.z);
         view_c[i] = vec4(project(b, c), layers[i]);
-        ViewBasis lb = bases.items[uint(light_layers[i]) - kind.first_layer];
+        ViewBasis lb = bases.items[uint(light_layers[i])];
         light_p[i] = project(lb, p);
         light_c[i] = vec4(project(lb, c), light_layers[i]);
         light_d[i] = project(lb, l);
@@ -82,6 +79,8 @@ void main() {
     sun = vec4(t.sun, t.hole);
     sky = vec4(t.sky, half_extent.z);
     uvec3 row = masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz;
-    tree_bits = uvec4(row, t.cascade | (t.view_layers >> 31u) << 4u | t.species << 8u);
+    // Under about eight pixels the three views differ by less than a pixel: sin 7 degrees of half the size.
+    uint estimates = t.mip > log2(RESOLUTION) - 3.5 ? 0u : VIEW_ITERATIONS - 1u;
+    tree_bits = uvec4(row, t.cascade | (below ? 16u : 0u) | t.species << 8u | estimates << 16u);
     dither = unit(hash(t.identity ^ HASH_DITHER));
 }

@@ -1,5 +1,5 @@
-// One fragment of a z-field tree (BN12, section 5): two iterations for the view ray, one for the light ray, light,
-// depth and sample mask, all from the same last fetch.
+// One fragment of a z-field tree (BN12, section 5): iterations for the view ray and the light ray, light, depth and sample
+// mask, all from the same last fetch.
 #include "physics/masks.glsl"
 #include "physics/zfield.glsl"
 #include "physics/shadow.glsl"
@@ -21,7 +21,6 @@ layout(location = 22) flat in float dither;
 layout(binding = 6) uniform sampler2DArray views;
 layout(binding = 7) uniform usampler2DArray shadow_map;
 layout(constant_id = 3) const uint SAMPLES = 4u;
-layout(constant_id = 4) const int VIEW_ITERATIONS = 2;
 layout(constant_id = 5) const int LIGHT_ITERATIONS = 1;
 layout(constant_id = 6) const bool HAS_SUN = true;
 
@@ -32,15 +31,18 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
         p[i] = view_p[i].xyz;
         d[i] = view_c[i].xyz - p[i];
     }
+    vec3 inverse_depth = 1.0 / vec3(d[0].z, d[1].z, d[2].z);
     vec3 w = vec3(weights.xy, 1.0 - weights.x - weights.y);
     vec3 layers = vec3(view_c[0].w, view_c[1].w, view_c[2].w);
     bool below = (tree_bits.w >> 4u & 1u) != 0u;
-    Surface at = Surface(0.0, 0.0, 0.0);
-    for (int k = 0; k < VIEW_ITERATIONS; k++) {
-        // The first of several reads one mip coarser, so that a small hole before the start does not end the search.
-        float mip = optics.x + (k == 0 && VIEW_ITERATIONS > 1 ? 1.0 : 0.0);
-        at = zfield_fetch(views, p, d, layers, w, mip, at.s, below, k == 0);
+    // All but the last iteration only move the point: one coarser mip, so that a small hole before the start does not end
+    // the search, and no filter. Trees of a few pixels, whose parallax between views is under a pixel, have none.
+    float start = 0.0;
+    uint estimates = tree_bits.w >> 16u;
+    for (uint k = 0u; k < estimates; k++) {
+        start = zfield_estimate(views, p, d, inverse_depth, layers, w, optics.x + 1.0, start, below);
     }
+    Surface at = zfield_fetch(views, p, d, inverse_depth, layers, w, optics.x, start, below, estimates > 0u);
     // Nothing behind the eye is seen: there s would be 1 or more.
     float s = clamp(at.s, -1e3, 0.999);
     float opacity = at.s < 0.999 ? at.opacity * optics.z : 0.0;
@@ -62,8 +64,9 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
             vec3 light_layers = vec3(light_c[0].w, light_c[1].w, light_c[2].w);
             // Start on the plane through the centre across the light.
             metres = -dot(lw, vec3(lp[0].z, lp[1].z, lp[2].z)) / dot(lw, vec3(ld[0].z, ld[1].z, ld[2].z));
+            vec3 inverse_light = 1.0 / vec3(ld[0].z, ld[1].z, ld[2].z);
             for (int k = 0; k < LIGHT_ITERATIONS; k++) {
-                metres = zfield_fetch(views, lp, ld, light_layers, lw, optics.x, metres, false, k == 0).s;
+                metres = zfield_fetch(views, lp, ld, inverse_light, light_layers, lw, optics.x, metres, false, k > 0).s;
             }
             metres = max(metres, 0.0);
             lit = exp(-optics.y * metres);
@@ -78,5 +81,5 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
     float height = mix(view_p[0].w, optics.w, s);
     float below_top = max(1.0 - height, 0.0) * sky.w;
     sky_part = sky.rgb * (at.occlusion / (1.0 + below_top * below_top * sun.w));
-    return (tree_bits.w >> 8u) + 1u;
+    return (tree_bits.w >> 8u & 255u) + 1u;
 }

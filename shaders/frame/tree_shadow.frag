@@ -21,7 +21,7 @@ void main() {
     }
     vec3 layers = vec3(light_d[0].w, light_d[1].w, light_d[2].w);
     vec3 w = vec3(optics.xy, 1.0 - optics.x - optics.y);
-    Surface back = zfield_fetch(views, p, d, layers, w, optics.z, 0.0, true, true);
+    Surface back = zfield_fetch(views, p, d, 1.0 / vec3(d[0].z, d[1].z, d[2].z), layers, w, optics.z, 0.0, true, false);
     float opacity = back.opacity * optics.w;
     if (opacity < 1.0 / 64.0) discard;
     float z = clamp(depth + back.s * depth_per_metre, 0.0, 1.0);

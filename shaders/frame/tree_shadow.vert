@@ -6,12 +6,13 @@
 #include "physics/zfield.glsl"
 #include "frame/tree_space.glsl"
 
-layout(std430, binding = 0) readonly buffer ViewBuffer { View v; } view;
+layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(std430, binding = 1) readonly buffer Trees { Tree items[]; } trees;
 layout(std430, binding = 2) readonly buffer Lists { uint items[]; } lists;
 layout(std430, binding = 3) readonly buffer SpeciesTable { Species items[]; } species;
 layout(std430, binding = 4) readonly buffer Bases { ViewBasis items[]; } bases;
 layout(push_constant) uniform Push { uint cascade; };
+layout(constant_id = 0) const int RINGS = 9;
 layout(constant_id = 1) const float RESOLUTION = 256.0;
 
 layout(location = 0) out vec3 light_p[3];
@@ -30,15 +31,16 @@ void main() {
     frame_across(w, right, up);
     float mip = clamp(floor(log2(RESOLUTION * v.cascade_texel[cascade] /
                                  (2.0 * max(half_extent.x, half_extent.z))) + 0.5), 0.0, log2(RESOLUTION));
-    vec2 margin = exp2(mip) / RESOLUTION * vec2(1.0, 1.5) +
-                  0.5 * v.cascade_texel[cascade] / vec2(half_extent.x, min(half_extent.x, half_extent.z));
-    vec2 corner = vec2((gl_VertexIndex & 1) == 0 ? -1.0 : 1.0, (gl_VertexIndex & 2) == 0 ? -1.0 : 1.0);
-    vec3 p = right * (corner.x * (1.0 + margin.x)) + up * (corner.y * (length(w.xy) + w.z + margin.y));
+    vec3 layers = unpack_layers(t.light_layers, kind.first_layer);
+    vec4 extent = tree_bounds(bases.items[uint(layers.x)].bounds, bases.items[uint(layers.y)].bounds,
+                              bases.items[uint(layers.z)].bounds, w, false, RINGS);
+    vec2 margin = exp2(mip) / RESOLUTION * vec2(1.0, length(w.xy) + w.z);
+    vec3 p = right * ((gl_VertexIndex & 1) == 0 ? extent.x - margin.x : extent.y + margin.x) +
+             up * ((gl_VertexIndex & 2) == 0 ? extent.z - margin.y : extent.w + margin.y);
     mat4 shadow = v.cascade_from_world[cascade];
     vec4 at = shadow * vec4(world_from_tree(t, kind, p), 1.0);
-    vec3 layers = unpack_layers(t.light_layers, kind.first_layer);
     for (int i = 0; i < 3; i++) {
-        ViewBasis b = bases.items[uint(layers[i]) - kind.first_layer];
+        ViewBasis b = bases.items[uint(layers[i])];
         light_p[i] = project(b, p);
         light_d[i] = vec4(project(b, l), layers[i]);
     }

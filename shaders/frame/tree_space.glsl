@@ -20,3 +20,20 @@ void frame_across(vec3 w, out vec3 right, out vec3 up) {
     right = radial > 1e-6 ? vec3(-w.y, w.x, 0.0) / radial : vec3(0.0, 1.0, 0.0);
     up = cross(w, right);
 }
+
+// Extents of the tree along right and up around a direction w, seen from afar: (least, greatest) of each. The views
+// around w hold the tree's true bounds. A point's coordinate along an axis that turns by 2 a from view to view is a
+// cosine of the angle, so between views it exceeds the larger of its two samples by at most 1 / cos a: a is half the
+// azimuth between views of the inner ring, and a hundredth more allows for the tilt of the axes against each other. Near
+// the zenith, where axes of neighbouring views differ much, the cylinder r <= 1, |z| <= 1 bounds the tree.
+vec4 tree_bounds(vec4 a, vec4 b, vec4 c, vec3 w, bool below, int rings) {
+    float sine = length(w.xy), cosine = abs(w.z);
+    vec4 cylinder = vec4(-1.0, 1.0, -sine - cosine, sine + cosine);
+    float ring = floor(atan(sine, cosine) * (float(rings) / 1.5707963));
+    if (ring < 2.0) return cylinder;
+    vec4 low = min(min(a, b), c), high = max(max(a, b), c);
+    vec4 seen = vec4(low.x, high.y, low.z, high.w) * (1.0 / cos(0.78539816 / ring) + 0.01);
+    // Seen from behind, left is right.
+    if (below) seen.xy = -seen.yx;
+    return vec4(max(seen.xz, cylinder.xz), min(seen.yw, cylinder.yw)).xzyw;
+}

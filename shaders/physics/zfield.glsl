@@ -7,7 +7,7 @@
 const float SQRT2 = 1.4142135623730951;
 
 struct Surface {
-    float s;          // along the ray; 0 where nothing is
+    float s;          // along the ray; where nothing is, the last estimate
     float opacity;
     float occlusion;  // sky visibility in the isolated tree
 };
@@ -15,30 +15,45 @@ struct Surface {
 // Depth by which a view may disagree with the point found so far before it counts half.
 const float AGREEMENT = 0.15;
 
-// One fetch from each view at q = p + s d. Each view's surface is at s_i = (z_i - depth_i(p)) / depth_i(d); their mean is
-// weighted by opacity, which premultiplied texels give without a division each. Where q is more than a first guess, a view
-// whose surface lies far from it shows another branch, and loses weight: k_i = w_i (1 - a_i e_i / (1 + e_i)) with
+// A first estimate of s: one unfiltered texel from each view at p + s d, outside the view its border. Each view's surface
+// is at s_i = (z_i - depth_i(p)) / depth_i(d); their mean is weighted by opacity, which premultiplied texels give without
+// a division each. inverse_depth is 1 / depth_i(d). Keeps s where nothing is.
+float zfield_estimate(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_depth, vec3 layers, vec3 weights, float mip,
+                      float s, bool farthest) {
+    float sum_s = 0.0, opacity = 0.0;
+    int level = int(mip);
+    ivec2 last = textureSize(views, level).xy - 1;
+    for (int i = 0; i < 3; i++) {
+        ivec2 at = ivec2(floor((p[i].xy + s * d[i].xy + 0.5) * vec2(last + 1)));
+        vec4 t = texelFetch(views, ivec3(clamp(at, ivec2(0), last), int(layers[i])), level);
+        float z = (farthest ? t.g : t.r) * (2.0 * SQRT2) - SQRT2 * t.a;
+        sum_s += weights[i] * (z - t.a * p[i].z) * inverse_depth[i];
+        opacity += weights[i] * t.a;
+    }
+    return opacity > 0.0 ? sum_s / opacity : s;
+}
+
+// The surface near q = p + s d, filtered. With `refine`, when q is more than the start of the search, a view whose surface
+// lies far from q shows another branch, and loses weight: k_i = w_i (1 - a_i e_i / (1 + e_i)) with
 // e_i = ((z_i - depth_i(q)) / AGREEMENT)^2.
-Surface zfield_fetch(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 layers, vec3 weights, float mip, float s,
-                     bool farthest, bool first) {
+Surface zfield_fetch(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_depth, vec3 layers, vec3 weights, float mip,
+                     float s, bool farthest, bool refine) {
     float sum_s = 0.0, opacity = 0.0, occlusion = 0.0, sum_k = 0.0;
     for (int i = 0; i < 3; i++) {
         vec2 uv = p[i].xy + s * d[i].xy + 0.5;
         vec4 t = textureLod(views, vec3(uv, layers[i]), mip);
         float z = (farthest ? t.g : t.r) * (2.0 * SQRT2) - SQRT2 * t.a;
-        float k = weights[i];
-        if (!first) {
-            // a e / (1 + e) with e = x2 / (a AGREEMENT)^2 and x = z - a depth(q), without dividing by a.
-            float x = (z - t.a * (p[i].z + s * d[i].z)) * (1.0 / AGREEMENT);
-            k *= 1.0 - t.a * x * x / max(x * x + t.a * t.a, 1e-12);
-        }
+        // a e / (1 + e) with e = x2 / (a AGREEMENT)^2 and x = z - a depth(q), without dividing by a.
+        float x = (z - t.a * (p[i].z + s * d[i].z)) * (1.0 / AGREEMENT);
+        float other = refine ? t.a * x * x / max(x * x + t.a * t.a, 1e-12) : 0.0;
+        float k = weights[i] * (1.0 - other);
         sum_k += k;
-        sum_s += k * (z - t.a * p[i].z) / d[i].z;
+        sum_s += k * (z - t.a * p[i].z) * inverse_depth[i];
         opacity += k * t.a;
         occlusion += k * t.b;
     }
     float inverse = opacity > 0.0 ? 1.0 / opacity : 0.0;
-    return Surface(sum_s * inverse, opacity / max(sum_k, 1e-6), min(occlusion * inverse, 1.0));
+    return Surface(opacity > 0.0 ? sum_s * inverse : s, opacity / max(sum_k, 1e-6), min(occlusion * inverse, 1.0));
 }
 
 // Three 10-bit layers, as floats for the sampler.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::bake::SpeciesBake;
+use crate::bake::{SpeciesBake, ZField};
 use crate::gpu::interface::{NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
 use crate::physics::masks::combination_table;
@@ -19,7 +19,7 @@ pub struct SpeciesData {
     pub table: Buffer,
     /// z-field views, species after species.
     pub views: Image,
-    /// Bases of the views of one species.
+    /// Bases of the views, species after species.
     pub bases: Buffer,
     /// Combination table of sample masks.
     pub masks: Buffer,
@@ -55,19 +55,7 @@ impl SpeciesData {
                 gpu.upload_image(&texels, level as u32, k as u32 * view_count, view_count, bytes)?;
             }
         }
-        let bases: Vec<ViewBasis> = views::pairs(n)
-            .map(|(i, j)| {
-                // u = 1/2 + (p · right) / (2 m), v = 1/2 + (p · up) / (2 m extent), with a border of one texel.
-                let basis = views::Basis::new(views::direction(n, i, j));
-                let m = f64::from(resolution) / f64::from(resolution - 2);
-                let row = |a: glam::DVec3, s: f64| [a.x * s, a.y * s, a.z * s, 0.0].map(|x| x as f32);
-                ViewBasis {
-                    u: row(basis.right, 0.5 / m),
-                    v: row(basis.up, 0.5 / (basis.extent * m)),
-                    depth: row(basis.w, 1.0),
-                }
-            })
-            .collect();
+        let bases: Vec<ViewBasis> = baked.iter().flat_map(|bake| view_bases(&bake.views)).collect();
         let maps: Vec<&Raster> = scene.species.iter().filter_map(density_map).collect();
         let size = maps.iter().fold([1, 1], |s: [u32; 2], m| [s[0].max(m.width), s[1].max(m.height)]);
         let densities = gpu.image(&ImageDesc {
@@ -102,6 +90,42 @@ impl SpeciesData {
             densities,
         })
     }
+}
+
+/// The projection into every view of a species, and what each view shows.
+fn view_bases(field: &ZField) -> Vec<ViewBasis> {
+    let side = field.resolution as usize;
+    let texels = field.levels[0].chunks_exact(4 * side * side);
+    views::pairs(field.n)
+        .zip(texels)
+        .map(|((i, j), texels)| {
+            // u = 1/2 + (p · right) / (2 m), v = 1/2 + (p · up) / (2 m extent), with a border of one texel.
+            let basis = views::Basis::new(views::direction(field.n, i, j));
+            let m = side as f64 / (side as f64 - 2.0);
+            let row = |a: glam::DVec3, s: f64| [a.x * s, a.y * s, a.z * s, 0.0].map(|x| x as f32);
+            // First and last column and row with any opacity, as borders of texels.
+            let (mut low, mut high) = ([side; 2], [0; 2]);
+            for (k, _) in texels.chunks_exact(4).enumerate().filter(|(_, t)| t[3] > 0) {
+                for (axis, at) in [k % side, k / side].into_iter().enumerate() {
+                    low[axis] = low[axis].min(at);
+                    high[axis] = high[axis].max(at + 1);
+                }
+            }
+            let along = |at: usize, extent: f64| ((at as f64 / side as f64 - 0.5) * 2.0 * m * extent) as f32;
+            let bounds = if high[0] == 0 {
+                [0.0; 4]
+            } else {
+                let e = basis.extent;
+                [along(low[0], 1.0), along(high[0], 1.0), along(low[1], e), along(high[1], e)]
+            };
+            ViewBasis {
+                u: row(basis.right, 0.5 / m),
+                v: row(basis.up, 0.5 / (basis.extent * m)),
+                depth: row(basis.w, 1.0),
+                bounds,
+            }
+        })
+        .collect()
 }
 
 fn density_map(species: &crate::scene::Species) -> Option<&Raster> {

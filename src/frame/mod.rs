@@ -12,6 +12,7 @@ pub mod view;
 
 use std::sync::Arc;
 
+use crate::Result;
 use crate::bake::SpeciesBake;
 use crate::forest::cull::{CullData, TreeCounts};
 use crate::forest::seeds::SeedData;
@@ -22,7 +23,6 @@ use crate::gpu::{Buffer, Gpu, PassTime};
 use crate::image::Picture;
 use crate::plan::Plan;
 use crate::scene::{Camera, Scene};
-use crate::{Error, Result};
 use camera::Eye;
 use ground::Ground;
 use shadows::Shadows;
@@ -77,7 +77,7 @@ impl Renderer {
     /// Builds what the plan lists.
     ///
     /// # Errors
-    /// [`Error::Device`] when out of memory.
+    /// [`crate::Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, scene: Arc<Scene>, plan: Plan, baked: &[Arc<SpeciesBake>]) -> Result<Self> {
         let areas = scene.species.iter().zip(baked).map(|(_, b)| f64::from(b.area));
         let mean_area = areas.sum::<f64>() / baked.len().max(1) as f64;
@@ -122,7 +122,7 @@ impl Renderer {
     /// Draws one frame and waits for it.
     ///
     /// # Errors
-    /// [`Error::Usage`] when the view needs more quads or trees than the plan holds; [`Error::Device`].
+    /// [`crate::Error::Usage`] when the view needs more quads or trees than the plan holds; [`crate::Error::Device`].
     pub fn render(&mut self, camera: &Camera, exposure: f64) -> Result<FrameReport> {
         self.render_eye(&Eye::new(camera, &self.scene.terrain, self.plan.size), exposure).map(|(r, _)| r)
     }
@@ -187,7 +187,7 @@ impl Renderer {
     /// Reads the last frame back: the display picture, and with layers the linear image.
     ///
     /// # Errors
-    /// [`Error::Device`] if the device fails.
+    /// [`crate::Error::Device`] if the device fails.
     pub fn picture(&self) -> Result<Picture> {
         Picture::read(&self.gpu, &self.plan, &self.targets, self.light.scale)
     }
@@ -207,14 +207,12 @@ fn shadow_reach(sun: [f64; 3], cascades: u32, tall: f64) -> [f64; 3] {
     [-sun[0] * length, -sun[1] * length, -sun[2] * length]
 }
 
-/// Rejects an exposure that is not a positive number.
-///
-/// # Errors
-/// [`Error::Usage`].
-pub fn check_exposure(ev: f64) -> Result<f64> {
-    if ev.is_finite() && ev.abs() <= 64.0 {
-        Ok(ev.exp2())
-    } else {
-        Err(Error::Usage(format!("exposure {ev} EV; it takes -64 to 64")))
-    }
+/// The exposure at which a level forest floor of 6 % reflectance, under this sun and sky, is drawn at an eighth of the
+/// display's linear range: forests are dark, and snow would be white.
+pub fn auto_exposure(scene: &Scene) -> f64 {
+    let light = Light::new(scene);
+    let luminance = |c: [f64; 3]| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+    let up = light.direction[2].max(0.2);
+    let radiance = 0.06 / std::f64::consts::PI * (luminance(light.sun) * up) + 0.06 * luminance(light.sky);
+    if radiance > 0.0 { 0.12 / radiance } else { 1.0 }
 }

@@ -57,7 +57,8 @@ impl Shadows {
                 constants,
             })
         };
-        let resolution = [(1, (scene.settings.view_resolution as f32).to_bits())];
+        let s = &scene.settings;
+        let views = [(0, s.view_rings), (1, (s.view_resolution as f32).to_bits())];
         let map = image("shadow cascades", vk::Format::R32_UINT, vk::ImageUsageFlags::COLOR_ATTACHMENT)?;
         if !on {
             return Ok(Shadows { map, depth: None, programs: None });
@@ -71,7 +72,7 @@ impl Shadows {
             )?),
             programs: Some((
                 program(&shaders::FRAME_TERRAIN_SHADOW_VERT, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[])?,
-                program(&shaders::FRAME_TREE_SHADOW_VERT, &shaders::FRAME_TREE_SHADOW_FRAG, &resolution)?,
+                program(&shaders::FRAME_TREE_SHADOW_VERT, &shaders::FRAME_TREE_SHADOW_FRAG, &views)?,
             )),
         })
     }

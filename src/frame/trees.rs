@@ -32,6 +32,7 @@ impl Trees {
             blend: Blend::Replace,
             topology: Topology::Triangles,
             constants: &[
+                (0, s.view_rings),
                 (1, (s.view_resolution as f32).to_bits()),
                 (2, mask_rows),
                 (3, plan.samples),
