@@ -1,6 +1,6 @@
 //! Progress of anything over a second: a bar on a terminal, plain lines elsewhere, nothing when quiet.
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -49,7 +49,8 @@ impl Progress {
             if self.start.elapsed() > Duration::from_secs(1)
                 && self.decile.fetch_max(decile, Ordering::Relaxed) < decile
             {
-                eprintln!("{label}: {} %", decile * 10);
+                // Not `eprintln!`, which panics when no one listens any more.
+                let _ = writeln!(std::io::stderr(), "{label}: {} %", decile * 10);
             }
         }
     }

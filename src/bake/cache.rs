@@ -67,7 +67,8 @@ pub fn load_or_bake(
         Err(e) if e.kind() == io::ErrorKind::NotFound => CacheState::Baked,
         Err(e) => {
             if !quiet {
-                eprintln!("cache: {}: {e}; baking again", path.display());
+                // Not `eprintln!`, which panics when no one listens any more.
+                let _ = writeln!(io::stderr(), "cache: {}: {e}; baking again", path.display());
             }
             CacheState::Rebuilt
         }
@@ -76,7 +77,7 @@ pub fn load_or_bake(
     if let Err(e) = write(dir, &path, &key, &bake) {
         static WARNED: AtomicBool = AtomicBool::new(false);
         if !quiet && !WARNED.swap(true, Ordering::Relaxed) {
-            eprintln!("cache: cannot write to {}: {e}; going on without", dir.display());
+            let _ = writeln!(io::stderr(), "cache: cannot write to {}: {e}; going on without", dir.display());
         }
     }
     Ok((bake, state))

@@ -21,7 +21,7 @@ pub use context::{Gpu, GpuOptions};
 pub use memory::{Buffer, Image, ImageDesc};
 pub use program::{Blend, DepthTest, GraphicsDesc, Program, Sampler, Topology};
 pub use record::{Attachment, ComputePass, PassTime, Recorder, RenderPass, Resource, Targets, Work};
-pub use select::{DeviceInfo, devices};
+pub use select::{DeviceInfo, devices, find};
 
 /// A descriptor binding of a shader, from reflection; every binding is in set 0.
 #[derive(Clone, Copy, Debug)]

@@ -15,8 +15,8 @@ use toml::de::DeTable;
 use super::input::read_text;
 use super::keys::{Item, Source, Table};
 use super::{Camera, Scene, Sky, Sun, texture};
-use crate::Result;
 use crate::settings::{KNOBS, PRESETS, Settings, nearest};
+use crate::{Error, Result};
 
 const MAX_BYTES: u64 = 16 << 20;
 
@@ -30,16 +30,36 @@ const MAX_LIGHT: f64 = 1e6;
 ///
 /// Errors name the file, the line and the key, or the place in the model, raster or table that is wrong.
 pub fn load(path: &Path) -> Result<Scene> {
-    parse(&read_text(path, MAX_BYTES)?, path)
+    load_at(Some(path), None)
 }
 
 /// The embedded default scene: procedural ridges and trees, no file needed.
 pub fn default_scene() -> Result<Scene> {
-    parse(include_str!("default.toml"), Path::new("default.toml"))
+    load_at(None, None)
+}
+
+/// Reads a scene file, or without a path the embedded scene, at another quality: `preset` takes the place of the
+/// scene's own, and the scene's own knobs still hold.
+///
+/// Errors as [`load`], and for an unknown preset.
+pub fn load_at(path: Option<&Path>, preset: Option<&str>) -> Result<Scene> {
+    match path {
+        Some(path) => read(&read_text(path, MAX_BYTES)?, path, preset),
+        None => read(include_str!("default.toml"), Path::new("default.toml"), preset),
+    }
 }
 
 /// Reads a scene from text as if it were the file `path`: for messages, and as what relative paths start from.
 pub fn parse(text: &str, path: &Path) -> Result<Scene> {
+    read(text, path, None)
+}
+
+fn read(text: &str, path: &Path, preset: Option<&str>) -> Result<Scene> {
+    let settings = preset.map_or(Ok(Settings::default()), |name| {
+        Settings::preset(name).ok_or_else(|| {
+            Error::Usage(format!("there is no preset \"{name}\"; the presets are: {}", PRESETS.join(", ")))
+        })
+    })?;
     let source = Source { path, text };
     let document = DeTable::parse(text).map_err(|e| source.syntax(&e))?;
     let known = ["name", "seed", "terrain", "species", "sun", "sky", "camera", "quality"];
@@ -51,7 +71,10 @@ pub fn parse(text: &str, path: &Path) -> Result<Scene> {
         seed: root.get("seed").map_or(Ok(0), |i| i.whole())?,
         // Cameras before species: a mistake there should not wait for the models to load.
         cameras: cameras(&root.require("camera")?, terrain.origin)?,
-        settings: root.get("quality").map_or(Ok(Settings::default()), |i| quality(&i))?,
+        settings: match root.get("quality") {
+            Some(item) => quality(&item, settings, preset.is_some())?,
+            None => settings,
+        },
         sun: root
             .get("sun")
             .map_or(Ok(Sun { azimuth: 0.0, elevation: 90.0, irradiance: [0.0; 3] }), |i| sun(&i))?,
@@ -151,19 +174,22 @@ fn cameras(item: &Item, origin: [f64; 2]) -> Result<Vec<Camera>> {
     Ok(cameras)
 }
 
-fn quality(item: &Item) -> Result<Settings> {
+/// The preset, unless the caller has chosen one, then the knobs.
+fn quality(item: &Item, mut settings: Settings, chosen: bool) -> Result<Settings> {
     let known: Vec<&str> = std::iter::once("preset").chain(KNOBS.iter().map(|k| k.name)).collect();
     let table = item.table(&known)?;
-    let mut settings = Settings::default();
     if let Some(preset) = table.get("preset") {
         let name = preset.text()?;
-        settings = Settings::preset(name).ok_or_else(|| {
+        let own = Settings::preset(name).ok_or_else(|| {
             let remedy = match nearest(name, PRESETS) {
                 Some(near) => format!("did you mean \"{near}\"?"),
                 None => format!("the presets are: {}", PRESETS.join(", ")),
             };
             preset.error(format!("there is no preset \"{name}\""), &remedy)
         })?;
+        if !chosen {
+            settings = own;
+        }
     }
     for item in table.items().iter().filter(|i| i.name() != "preset") {
         let value = item.number(f64::MIN..=f64::MAX, "")?;

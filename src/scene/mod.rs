@@ -15,8 +15,9 @@ pub mod texture;
 
 use std::sync::Arc;
 
-use crate::settings::Settings;
-pub use file::{default_scene, load, parse};
+use crate::settings::{Settings, nearest};
+use crate::{Error, Result};
+pub use file::{default_scene, load, load_at, parse};
 pub use mesh::{Material, Mesh, Texture};
 
 /// A whole scene, ready to plan and render.
@@ -38,6 +39,24 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Preset and knobs.
     pub settings: Settings,
+}
+
+impl Scene {
+    /// The camera of a name, or without one the first.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] names the nearest camera, and all of them.
+    pub fn camera(&self, name: Option<&str>) -> Result<&Camera> {
+        let Some(name) = name else {
+            return self.cameras.first().ok_or_else(|| Error::Usage("the scene has no camera".into()));
+        };
+        self.cameras.iter().find(|c| c.name == name).ok_or_else(|| {
+            let names: Vec<&str> = self.cameras.iter().map(|c| c.name.as_str()).collect();
+            let hint = nearest(name, names.iter().copied())
+                .map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
+            Error::Usage(format!("no camera \"{name}\"; {hint}the scene has: {}", names.join(", ")))
+        })
+    }
 }
 
 /// A raster of 32-bit floats; row 0 is **south**, so that row and y grow together.

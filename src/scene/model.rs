@@ -18,7 +18,7 @@ use self::buffers::Buffers;
 use self::materials::Materials;
 use super::input::read_bytes;
 use super::mesh::{Mesh, Triangle};
-use crate::{Error, Result};
+use crate::{Error, Result, tree};
 
 /// Most vertices, and most triangles, of a model.
 pub const MAX_ELEMENTS: usize = 16_000_000;
@@ -36,6 +36,24 @@ const MAX_BYTES: u64 = 2 << 30;
 /// too large, names in `foliage` that no material has.
 pub fn load_model(path: &Path, foliage: Option<&[String]>) -> Result<Mesh> {
     load_model_bytes(path, &read_bytes(path, MAX_BYTES)?, path.parent(), foliage)
+}
+
+/// Reads what a person names as a model: a file, or `builtin:` and a tree; scaled to a `height` in metres, if given.
+///
+/// Errors as [`load_model`], for an unknown tree, and for a height out of 0.01 to 1000 m.
+pub fn load_named(name: &Path, height: Option<f64>) -> Result<Mesh> {
+    let builtin = name.to_str().and_then(|n| n.strip_prefix("builtin:"));
+    let mut mesh = match builtin {
+        Some(tree) => load_model_bytes(name, &tree::glb(tree.parse()?, tree::BUILTIN_SEED), None, None)?,
+        None => load_model(name, None)?,
+    };
+    if let Some(height) = height {
+        if !(0.01..=1000.0).contains(&height) {
+            return Err(Error::Usage(format!("a height of {height} m; it takes 0.01 to 1000")));
+        }
+        scale_to_height(&mut mesh, height, name)?;
+    }
+    Ok(mesh)
 }
 
 /// Reads a model from memory, as [`load_model`]; `name` is for messages, and relative URIs are looked up in `folder`.

@@ -14,6 +14,9 @@ mod surface;
 
 use std::str::FromStr;
 
+/// Seed of built-in models: every scene shows the same individual, so that what is baked from it is shared.
+pub const BUILTIN_SEED: u32 = 1;
+
 /// A species that needs no file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preset {

@@ -10,13 +10,10 @@ use super::super::{Distribution, Mesh, OpticsOverride, Species, Terrain, positio
 use super::{existing, unique};
 use crate::Result;
 use crate::settings::nearest;
-use crate::tree::{self, Preset};
+use crate::tree::{self, BUILTIN_SEED, Preset};
 
 /// Most trees per m²: seedlings in a nursery stand closer than any forest.
 const MAX_DENSITY: f64 = 1e4;
-
-/// Seed of built-in models: every scene shows the same individual, so that what is baked from it is shared.
-const BUILTIN_SEED: u32 = 1;
 
 const KEYS: [&str; 14] = [
     "name",

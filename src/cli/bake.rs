@@ -1,0 +1,210 @@
+//! `canopy bake`.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use canopy::Result;
+use canopy::bake::{self, BakeSettings, CacheState, SpeciesBake, cache, load_or_bake};
+use canopy::scene::{Mesh, OpticsOverride, Species};
+
+use super::SCHEMA_VERSION;
+use super::options::{PrintOptions, QualityOptions, knobs_help};
+use super::output::{self, Table};
+
+const EXAMPLES: &str = "\
+Examples:
+  canopy bake builtin:oak                   what the built-in scene would bake on first use
+  canopy bake oak.glb --height 15           as a scene with `height = 15.0` needs it
+  canopy bake my.toml                       every species of a scene
+  canopy bake oak.glb --verify 64           how well the z-field stands for the mesh
+  canopy bake oak.glb --set view_rings=6    with fewer views
+Bakes are kept in $CANOPY_CACHE, else $XDG_CACHE_HOME/canopy, else ~/.cache/canopy.";
+
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{}", knobs_help()))]
+pub struct Args {
+    /// Model (.glb, .gltf), builtin:oak, builtin:pine, builtin:birch, or a scene file (.toml): its every species
+    model: PathBuf,
+    /// Height of an unscaled tree, m; left out: as modelled
+    #[arg(long, value_name = "METRES")]
+    height: Option<f64>,
+    /// Compare the bake with its mesh from N directions between the stored views
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    verify: Option<u32>,
+    #[command(flatten)]
+    quality: QualityOptions,
+    #[command(flatten)]
+    print: PrintOptions,
+}
+
+/// Agreement of z-field and mesh at a number of iterations.
+#[derive(serde::Serialize)]
+struct Quality {
+    iterations: u32,
+    directions: u32,
+    iou_mean: f64,
+    iou_min: f64,
+    coverage_ratio_mean: f64,
+    median_depth_error_m_mean: f64,
+    depth_error_m_mean: f64,
+}
+
+#[derive(serde::Serialize)]
+struct Optics {
+    height_m: f32,
+    crown_radius_m: f32,
+    crown_base_m: f32,
+    projected_area_m2: f32,
+    extinction_per_m: f32,
+    leaf_reflectance: [f32; 3],
+    leaf_transmittance: [f32; 3],
+}
+
+#[derive(serde::Serialize)]
+struct Baked {
+    name: String,
+    triangles: usize,
+    views: u32,
+    resolution: u32,
+    bytes: usize,
+    cache: &'static str,
+    path: Option<String>,
+    seconds: f64,
+    optics: Optics,
+    verify: Vec<Quality>,
+}
+
+#[derive(serde::Serialize)]
+struct Report {
+    schema_version: u32,
+    command: &'static str,
+    species: Vec<Baked>,
+}
+
+/// A cache state in words, here and in the report of a render.
+pub fn state(state: CacheState) -> &'static str {
+    match state {
+        CacheState::Hit => "hit",
+        CacheState::Baked => "baked",
+        CacheState::Rebuilt => "rebuilt",
+    }
+}
+
+pub fn run(args: &Args) -> Result<()> {
+    let mut species = Vec::new();
+    if args.model.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        let mut scene = canopy::scene::load_at(Some(&args.model), args.quality.preset.as_deref())?;
+        args.quality.set(&mut scene.settings)?;
+        for Species { name, mesh, optics, .. } in &scene.species {
+            species.push(one(args, name.clone(), mesh, optics, &scene.settings)?);
+        }
+    } else {
+        let settings = args.quality.settings()?;
+        let mesh = canopy::scene::model::load_named(&args.model, args.height)?;
+        let name = args.model.display().to_string();
+        species.push(one(args, name, &mesh, &OpticsOverride::default(), &settings)?);
+    }
+    let report = Report { schema_version: SCHEMA_VERSION, command: "bake", species };
+    if args.print.json {
+        output::json(&report)
+    } else if args.print.quiet {
+        Ok(())
+    } else {
+        output::print(&report.species.iter().map(text).collect::<String>())
+    }
+}
+
+/// Bakes one species and, if asked, compares.
+fn one(
+    args: &Args,
+    name: String,
+    mesh: &Mesh,
+    optics: &OpticsOverride,
+    settings: &canopy::settings::Settings,
+) -> Result<Baked> {
+    let wanted = BakeSettings::from(settings);
+    let dir = cache::default_dir();
+    let start = Instant::now();
+    let (bake, from) = load_or_bake(mesh, optics, &wanted, dir.as_deref(), args.print.quiet)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let path = dir.map(|d| cache::path(&d, &cache::key(mesh, optics, &wanted))).filter(|p| p.is_file());
+    let verify = match args.verify {
+        Some(n) => {
+            (1..=settings.view_iterations).map(|i| quality(mesh, &bake, n, i)).collect::<Result<_>>()?
+        }
+        None => Vec::new(),
+    };
+    Ok(Baked {
+        name,
+        triangles: mesh.triangles.len(),
+        views: canopy::physics::views::count(wanted.rings),
+        resolution: wanted.resolution,
+        bytes: bake.views.levels.iter().map(Vec::len).sum(),
+        cache: state(from),
+        path: path.map(|p| p.display().to_string()),
+        seconds,
+        optics: Optics {
+            height_m: bake.height,
+            crown_radius_m: bake.crown_radius,
+            crown_base_m: bake.crown_base,
+            projected_area_m2: bake.area,
+            extinction_per_m: bake.extinction,
+            leaf_reflectance: bake.reflectance,
+            leaf_transmittance: bake.transmittance,
+        },
+        verify,
+    })
+}
+
+fn quality(mesh: &Mesh, bake: &SpeciesBake, directions: u32, iterations: u32) -> Result<Quality> {
+    let report = bake::verify(mesh, bake, directions, iterations)?;
+    Ok(Quality {
+        iterations,
+        directions,
+        iou_mean: report.mean(|v| v.iou),
+        iou_min: report.min_iou(),
+        coverage_ratio_mean: report.mean(|v| v.coverage_ratio),
+        median_depth_error_m_mean: report.mean(|v| v.median_depth_error),
+        depth_error_m_mean: report.mean(|v| v.mean_depth_error),
+    })
+}
+
+fn text(b: &Baked) -> String {
+    let o = &b.optics;
+    let rgb = |c: [f32; 3]| format!("{:.4} {:.4} {:.4}", c[0], c[1], c[2]);
+    let mut table = Table::new(2, &[b.name.as_str(), ""]);
+    for (what, value) in [
+        ("triangles", b.triangles.to_string()),
+        (
+            "views",
+            format!("{} of {2} x {2} texels, {}", b.views, output::bytes(b.bytes as u64), b.resolution),
+        ),
+        ("height", format!("{:.2} m", o.height_m)),
+        ("crown", format!("radius {:.2} m, from {:.2} m up", o.crown_radius_m, o.crown_base_m)),
+        ("projected area", format!("{:.2} m²", o.projected_area_m2)),
+        ("extinction", format!("{:.3} /m", o.extinction_per_m)),
+        ("leaf reflectance", rgb(o.leaf_reflectance)),
+        ("leaf transmittance", rgb(o.leaf_transmittance)),
+        ("time", format!("{:.2} s", b.seconds)),
+        ("cache", format!("{} {}", b.cache, b.path.as_deref().unwrap_or("(not kept)"))),
+    ] {
+        table.row([format!("  {what}"), value]);
+    }
+    let mut text = table.text();
+    if !b.verify.is_empty() {
+        let headings = ["iterations", "IoU mean", "IoU min", "coverage", "depth error: median", "mean"];
+        let mut table = Table::new(0, &headings);
+        for q in &b.verify {
+            table.row([
+                q.iterations.to_string(),
+                format!("{:.4}", q.iou_mean),
+                format!("{:.4}", q.iou_min),
+                format!("{:.4}", q.coverage_ratio_mean),
+                format!("{:.3} m", q.median_depth_error_m_mean),
+                format!("{:.3} m", q.depth_error_m_mean),
+            ]);
+        }
+        text += &format!("  z-field against mesh, {} directions\n{}", b.verify[0].directions, table.text());
+    }
+    text
+}

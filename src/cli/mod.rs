@@ -1,0 +1,67 @@
+//! The command line: one file a command, and no logic that the library does not have.
+
+mod bake;
+mod devices;
+mod options;
+mod output;
+mod plan;
+mod render;
+mod tree;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Version of every JSON object that the commands print; raised when a key changes its meaning or goes.
+const SCHEMA_VERSION: u32 = 1;
+
+const AFTER_HELP: &str = "\
+Start here:
+  canopy render -o ridge.png           draw the built-in scene
+  canopy render my.toml --json         draw your own, with a report for a script
+  canopy render --help                 what can be changed, and every knob
+
+Exit codes: 0 done, 1 a check failed, 2 wrong usage or bad input, 3 no suitable device,
+4 validation error, 6 device lost or out of memory.";
+
+/// Draws forests from a leaf to the horizon, headless, on any Vulkan 1.3 driver.
+#[derive(Parser)]
+#[command(name = "canopy", version, after_help = AFTER_HELP, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Draw one image of a scene: PNG, and linear EXR with named layers.
+    Render(render::Args),
+    /// Precompute a tree model ahead of time (otherwise done on first use), and measure how good it is.
+    Bake(bake::Args),
+    /// Write a procedural tree as binary glTF.
+    Tree(tree::Args),
+    /// List what a scene requires, with reasons and bytes, without building any of it.
+    Plan(plan::Args),
+    /// List the Vulkan devices and whether they fit.
+    Devices(devices::Args),
+}
+
+/// Runs the program and returns its exit code.
+pub fn run() -> ExitCode {
+    let done = match Cli::parse().command {
+        Command::Render(args) => render::run(&args),
+        Command::Bake(args) => bake::run(&args),
+        Command::Tree(args) => tree::run(&args),
+        Command::Plan(args) => plan::run(&args),
+        Command::Devices(args) => devices::run(&args),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            // Not `eprintln!`, which panics when no one listens any more.
+            let _ = writeln!(std::io::stderr(), "error: {e}");
+            ExitCode::from(e.exit_code())
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! Options that several commands share.
+
+use std::path::PathBuf;
+
+use canopy::scene::{Camera, Scene};
+use canopy::settings::{KNOBS, PRESETS, Settings};
+use canopy::{Error, Result};
+use clap::builder::PossibleValuesParser;
+
+/// Which scene, from where, how large and how well.
+#[derive(clap::Args)]
+pub struct SceneOptions {
+    /// Scene file (TOML); left out: the built-in scene, which needs no file
+    pub scene: Option<PathBuf>,
+    /// Image size in pixels
+    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1024x768", value_parser = size)]
+    pub size: [u32; 2],
+    /// Camera by its name in the scene; left out: the first
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+    /// Seed of everything random, instead of the scene's
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u32>,
+    #[command(flatten)]
+    pub quality: QualityOptions,
+}
+
+impl SceneOptions {
+    /// The scene with everything that the options change, and the camera.
+    pub fn load(&self) -> Result<(Scene, Camera)> {
+        let mut scene = canopy::scene::load_at(self.scene.as_deref(), self.quality.preset.as_deref())?;
+        self.quality.set(&mut scene.settings)?;
+        if let Some(seed) = self.seed {
+            scene.seed = seed;
+        }
+        let camera = scene.camera(self.camera.as_deref())?.clone();
+        Ok((scene, camera))
+    }
+}
+
+/// Preset and knobs.
+#[derive(clap::Args)]
+pub struct QualityOptions {
+    /// Preset of all knobs, instead of the scene's
+    #[arg(long = "quality", value_name = "PRESET", value_parser = PossibleValuesParser::new(PRESETS))]
+    pub preset: Option<String>,
+    /// Set one knob; repeatable. The order: preset, then the scene's own knobs, then each --set
+    #[arg(long, value_name = "KNOB=VALUE", value_parser = assignment)]
+    pub set: Vec<(String, f64)>,
+}
+
+impl QualityOptions {
+    /// Applies each `--set`.
+    pub fn set(&self, settings: &mut Settings) -> Result<()> {
+        self.set.iter().try_for_each(|(name, value)| settings.set(name, *value))
+    }
+
+    /// The settings where no scene has a say.
+    pub fn settings(&self) -> Result<Settings> {
+        let preset = self.preset.as_deref().unwrap_or(PRESETS[1]);
+        let mut settings =
+            Settings::preset(preset).ok_or_else(|| Error::Usage(format!("no preset \"{preset}\"")))?;
+        self.set(&mut settings)?;
+        Ok(settings)
+    }
+}
+
+/// What to print.
+#[derive(clap::Args, Clone, Copy)]
+pub struct PrintOptions {
+    /// Print nothing but errors (and the object of --json)
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print one JSON object on the standard output, and nothing else there
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn size(text: &str) -> std::result::Result<[u32; 2], String> {
+    let form = || "write WIDTHxHEIGHT in pixels, such as 1024x768".to_string();
+    let (width, height) = text.split_once(['x', 'X', '×']).ok_or_else(form)?;
+    let side = |s: &str| -> std::result::Result<u32, String> {
+        let n = s.trim().parse().map_err(|_| form())?;
+        if (1..=65536).contains(&n) { Ok(n) } else { Err(format!("{n} pixels; a side has 1 to 65536")) }
+    };
+    Ok([side(width)?, side(height)?])
+}
+
+fn assignment(text: &str) -> std::result::Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("write KNOB=VALUE, such as samples=8")?;
+    let number = value.trim().parse().map_err(|_| format!("\"{value}\" is no number"))?;
+    Ok((name.trim().to_string(), number))
+}
+
+/// Every knob, for `--help`.
+pub fn knobs_help() -> String {
+    let mut text = String::from("Knobs for --set and [quality] (fast / balanced / accurate):\n");
+    for k in KNOBS {
+        let [fast, balanced, accurate] = k.presets;
+        text += &format!("  {} = {fast} / {balanced} / {accurate}", k.name);
+        text +=
+            &format!("   [{} to {}{}{}]\n", k.min, k.max, if k.unit.is_empty() { "" } else { " " }, k.unit);
+        text += &format!("      {}\n", k.help);
+    }
+    text
+}

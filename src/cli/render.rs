@@ -1,0 +1,314 @@
+//! `canopy render`.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+use canopy::bake::{SpeciesBake, cache, load_or_bake};
+use canopy::frame::{FrameReport, Renderer, auto_exposure, check_exposure};
+use canopy::gpu::{DeviceInfo, Gpu, GpuOptions, PassTime};
+use canopy::plan::Plan;
+use canopy::progress::Progress;
+use canopy::scene::{Camera, Scene};
+use canopy::settings::Settings;
+use canopy::{Error, Result};
+
+use super::SCHEMA_VERSION;
+use super::options::{PrintOptions, SceneOptions, knobs_help};
+use super::output::{self, Table};
+
+const EXAMPLES: &str = "\
+Examples:
+  canopy render -o ridge.png                          the built-in scene, first camera
+  canopy render -o close.png --camera close           another of its cameras: ridge-line, near, aerial, close
+  canopy render my.toml -o a.png --exr a.exr          your scene, and linear radiance in layers
+  canopy render --size 320x240 --quality fast         small and quick
+  canopy render --set samples=8 --set cascades=2      turn knobs; --help lists them all
+  canopy render --frames 5 --json > report.json       warm timings for a script";
+
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{}", knobs_help()))]
+pub struct Args {
+    #[command(flatten)]
+    scene: SceneOptions,
+    /// Picture to write; left out: NAME.png after the scene, or canopy.png
+    #[arg(short, long, value_name = "FILE.png")]
+    output: Option<PathBuf>,
+    /// Linear image to write, with layers radiance, sun, sky, depth, trees, species
+    #[arg(long, value_name = "FILE.exr")]
+    exr: Option<PathBuf>,
+    /// Stops brighter (or, negative, darker) than the automatic exposure
+    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true)]
+    exposure: f64,
+    /// Frames to draw. The first one also fills the caches; times of passes are the last one's
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: u32,
+    /// Device by UUID or part of its name; left out: the best that fits (see `canopy devices`)
+    #[arg(long, value_name = "UUID|NAME")]
+    device: Option<String>,
+    /// Watch with the Vulkan validation layers; any message makes the exit code 4
+    #[arg(long)]
+    validate: bool,
+    #[command(flatten)]
+    print: PrintOptions,
+}
+
+#[derive(serde::Serialize)]
+struct SceneReport<'a> {
+    name: &'a str,
+    seed: u32,
+    species: Vec<&'a str>,
+    camera: &'a str,
+    size: [u32; 2],
+    exposure: f64,
+}
+
+/// Trees in view, by what draws them.
+#[derive(serde::Serialize)]
+struct Representations {
+    zfield: u32,
+}
+
+#[derive(serde::Serialize)]
+struct Trees<'a> {
+    in_view: u32,
+    by_representation: Representations,
+    casters_by_cascade: &'a [u32],
+}
+
+#[derive(serde::Serialize)]
+struct Allocation {
+    name: String,
+    bytes: u64,
+}
+
+#[derive(serde::Serialize)]
+struct Memory {
+    planned_bytes: u64,
+    allocated_bytes: u64,
+    allocations: Vec<Allocation>,
+}
+
+/// Wall times, s.
+#[derive(serde::Serialize)]
+struct Timings {
+    load_s: f64,
+    bake_s: f64,
+    build_s: f64,
+    frames_s: Vec<f64>,
+    write_s: f64,
+}
+
+#[derive(serde::Serialize)]
+struct Bake<'a> {
+    species: &'a str,
+    cache: &'static str,
+}
+
+#[derive(serde::Serialize)]
+struct Validation {
+    enabled: bool,
+    messages: Vec<String>,
+}
+
+#[derive(serde::Serialize)]
+struct Outputs {
+    png: String,
+    exr: Option<String>,
+}
+
+#[derive(serde::Serialize)]
+struct Report<'a> {
+    schema_version: u32,
+    command: &'static str,
+    scene: SceneReport<'a>,
+    settings: &'a Settings,
+    device: &'a DeviceInfo,
+    plan: &'a Plan,
+    bakes: Vec<Bake<'a>>,
+    passes: &'a [PassTime],
+    gpu_ms: f64,
+    trees: Trees<'a>,
+    terrain_quads: u32,
+    seed_quads: u32,
+    memory: Memory,
+    timings: Timings,
+    validation: Validation,
+    outputs: Outputs,
+}
+
+pub fn run(args: &Args) -> Result<()> {
+    let exposure = check_exposure(args.exposure)?;
+    if let Some(png) = &args.output {
+        output::check(png, "png")?;
+    }
+    if let Some(exr) = &args.exr {
+        output::check(exr, "exr")?;
+    }
+    let (quiet, start) = (args.print.quiet, Instant::now());
+    let loading = Progress::new("loading", 1, quiet);
+    let (scene, camera) = args.scene.load()?;
+    loading.finish();
+    let png = args.output.clone().unwrap_or_else(|| match args.scene.scene {
+        Some(_) => format!("{}.png", scene.name).into(),
+        None => "canopy.png".into(),
+    });
+    output::check(&png, "png")?;
+    let load_s = start.elapsed().as_secs_f64();
+    let gpu = Gpu::new(&GpuOptions { device: args.device.clone(), validate: args.validate })?;
+    let drawn = draw(args, exposure, &gpu, scene, &camera, png, load_s);
+    // What the validation layers say comes first: it may be why the drawing failed.
+    match (gpu.close(), drawn) {
+        (Err(e @ Error::Validation(_)), _) | (Ok(()), Err(e)) | (Err(e), Ok(())) => Err(e),
+        (Err(_), Err(e)) => Err(e),
+        (Ok(()), Ok(())) => Ok(()),
+    }
+}
+
+/// Everything between opening and closing the device.
+fn draw(
+    args: &Args,
+    exposure: f64,
+    gpu: &Gpu,
+    scene: Scene,
+    camera: &Camera,
+    png: PathBuf,
+    load_s: f64,
+) -> Result<()> {
+    let quiet = args.print.quiet;
+    let plan = Plan::new(&scene, camera, args.scene.size, args.exr.is_some(), Some(gpu.info()))?;
+    let scene = Arc::new(scene);
+    let start = Instant::now();
+    let (mut baked, mut states): (Vec<Arc<SpeciesBake>>, Vec<Bake>) = (Vec::new(), Vec::new());
+    let dir = cache::default_dir();
+    for s in &scene.species {
+        let (bake, state) =
+            load_or_bake(&s.mesh, &s.optics, &(&scene.settings).into(), dir.as_deref(), quiet)?;
+        baked.push(Arc::new(bake));
+        states.push(Bake { species: &s.name, cache: super::bake::state(state) });
+    }
+    let bake_s = start.elapsed().as_secs_f64();
+
+    let start = Instant::now();
+    let mut renderer = Renderer::new(gpu, scene.clone(), plan, &baked)?;
+    let build_s = start.elapsed().as_secs_f64();
+    let exposure = auto_exposure(&scene) * exposure;
+    let progress = Progress::new("drawing", args.frames.into(), quiet);
+    let mut frames_s = Vec::new();
+    let mut frame = None;
+    for _ in 0..args.frames {
+        let start = Instant::now();
+        frame = Some(renderer.render(camera, exposure)?);
+        frames_s.push(start.elapsed().as_secs_f64());
+        progress.step(1);
+    }
+    progress.finish();
+    let Some(frame) = frame else { return Ok(()) };
+
+    let start = Instant::now();
+    let picture = renderer.picture()?;
+    picture.write_png(&png)?;
+    if let Some(exr) = &args.exr {
+        picture.write_exr(exr)?;
+    }
+    let write_s = start.elapsed().as_secs_f64();
+
+    let allocations: Vec<Allocation> =
+        gpu.memory_report().into_iter().map(|(name, bytes)| Allocation { name, bytes }).collect();
+    let plan = renderer.plan();
+    let report = Report {
+        schema_version: SCHEMA_VERSION,
+        command: "render",
+        scene: SceneReport {
+            name: &scene.name,
+            seed: scene.seed,
+            species: scene.species.iter().map(|s| s.name.as_str()).collect(),
+            camera: &camera.name,
+            size: plan.size,
+            exposure,
+        },
+        settings: &scene.settings,
+        device: gpu.info(),
+        plan,
+        bakes: states,
+        passes: &frame.passes,
+        gpu_ms: frame.passes.iter().map(|p| p.gpu_ms).sum(),
+        trees: trees(&frame),
+        terrain_quads: frame.terrain_quads,
+        seed_quads: frame.seed_quads,
+        memory: Memory {
+            planned_bytes: plan.bytes(),
+            allocated_bytes: allocations.iter().map(|a| a.bytes).sum(),
+            allocations,
+        },
+        timings: Timings { load_s, bake_s, build_s, frames_s, write_s },
+        validation: Validation { enabled: args.validate, messages: gpu.messages() },
+        outputs: Outputs {
+            png: png.display().to_string(),
+            exr: args.exr.as_ref().map(|p| p.display().to_string()),
+        },
+    };
+    if args.print.json {
+        output::json(&report)
+    } else if quiet {
+        Ok(())
+    } else {
+        output::print(&text(&report))
+    }
+}
+
+fn trees(frame: &FrameReport) -> Trees<'_> {
+    Trees {
+        in_view: frame.trees.camera,
+        by_representation: Representations { zfield: frame.trees.camera },
+        casters_by_cascade: &frame.trees.cascades,
+    }
+}
+
+fn text(r: &Report) -> String {
+    let mut text = format!(
+        "{}, camera {}, {} x {} on {}\n\n",
+        r.scene.name, r.scene.camera, r.scene.size[0], r.scene.size[1], r.device.name
+    );
+    let mut passes = Table::new(1, &["pass", "GPU ms"]);
+    for p in r.passes {
+        passes.row([p.name.clone(), format!("{:.2}", p.gpu_ms)]);
+    }
+    passes.row(["total".into(), format!("{:.2}", r.gpu_ms)]);
+    text += &passes.text();
+
+    let mut drawn = Table::new(1, &["drawn", ""]);
+    drawn.row(["trees as z-fields".into(), r.trees.by_representation.zfield.to_string()]);
+    for (k, n) in r.trees.casters_by_cascade.iter().enumerate() {
+        drawn.row([format!("trees in cascade {k}"), n.to_string()]);
+    }
+    drawn.row(["terrain quads".into(), r.terrain_quads.to_string()]);
+    drawn.row(["seed quads".into(), r.seed_quads.to_string()]);
+    text += &format!("\n{}", drawn.text());
+
+    let mut memory = Table::new(1, &["device memory", ""]);
+    for i in r.plan.items.iter().filter(|i| i.bytes > 0) {
+        memory.row([i.name.clone(), output::bytes(i.bytes)]);
+    }
+    memory.row(["planned".into(), output::bytes(r.memory.planned_bytes)]);
+    memory.row(["allocated".into(), output::bytes(r.memory.allocated_bytes)]);
+    text += &format!("\n{}", memory.text());
+
+    let mut time = Table::new(1, &["time", "s"]);
+    let t = &r.timings;
+    let baked = r.bakes.iter().filter(|b| b.cache != "hit").count();
+    let bakes = format!("bake ({baked} made, {} from the cache)", r.bakes.len() - baked);
+    for (what, s) in [("load".into(), t.load_s), (bakes, t.bake_s), ("build".into(), t.build_s)] {
+        time.row([what, format!("{s:.3}")]);
+    }
+    time.row(["first frame".into(), format!("{:.3}", t.frames_s[0])]);
+    if let [_, .., last] = t.frames_s[..] {
+        time.row(["last frame".into(), format!("{last:.3}")]);
+    }
+    time.row(["read back and write".into(), format!("{:.3}", t.write_s)]);
+    text += &format!("\n{}\nwrote {}\n", time.text(), r.outputs.png);
+    if let Some(exr) = &r.outputs.exr {
+        text += &format!("wrote {exr}\n");
+    }
+    text
+}
