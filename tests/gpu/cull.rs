@@ -144,7 +144,7 @@ fn the_culled_set_and_its_order_are_those_of_the_cpu() {
         ("grazing", device::camera([20.0, 20.0, 0.5], [800.0, 700.0, 1.0])),
         ("straight down", device::camera([451.0, 449.0, 150.0], [451.0, 449.0, 0.0])),
         ("beside the terrain", device::camera([-60.0, 400.0, 30.0], [200.0, 420.0, 0.0])),
-        ("away from everything", device::camera([450.0, -10.0, 5.0], [450.0, -900.0, 5.0])),
+        ("away from everything", device::camera([450.0, -90.0, 5.0], [450.0, -900.0, 5.0])),
     ];
     let mut renderer = device::renderer(&gpu, &scene, &cameras[0].1, [96, 64], false);
     for (name, camera) in &cameras {
