@@ -9,6 +9,7 @@ mod extremes;
 mod faults;
 mod ground;
 mod light;
+mod light_on_ground;
 mod masks;
 mod plan;
 mod seeds;

@@ -264,23 +264,23 @@ fn a_quad_has_the_same_seeds_when_it_is_produced_again() {
 #[test]
 fn listed_trees_stand_where_the_list_says() {
     let gpu = device::open();
-    for with_hills in [false, true] {
-        let mut scene = plain(450.0, [0.0, 0.0]);
+    for (with_hills, side) in [(false, 450.0), (true, 450.0), (false, 333.37), (true, 417.13)] {
+        let mut scene = plain(side, [0.0, 0.0]);
         if with_hills {
             hills(&mut scene);
         }
         // All over, and on every border and corner of the terrain exactly.
         let mut list: Vec<TreePosition> = (0..3000u32)
             .map(|k| TreePosition {
-                x: 450.0 * f64::from(unit(hash(k))),
-                y: 450.0 * f64::from(unit(hash(k + 70_000))),
+                x: side * f64::from(unit(hash(k))),
+                y: side * f64::from(unit(hash(k + 70_000))),
                 scale: (k % 2 == 0).then_some(0.3 + 0.001 * k as f32),
                 rotation: (k % 3 == 0).then_some(k as f32 * 0.731 - 900.0),
             })
             .collect();
         for k in 0..=90 {
-            let v = 5.0 * f64::from(k);
-            for (x, y) in [(v, 0.0), (v, 450.0), (0.0, v), (450.0, v)] {
+            let v = side * f64::from(k) / 90.0;
+            for (x, y) in [(v, 0.0), (v, side), (0.0, v), (side, v)] {
                 list.push(TreePosition { x, y, scale: Some(1.0), rotation: Some(0.0) });
             }
         }
