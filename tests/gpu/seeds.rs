@@ -261,29 +261,49 @@ fn a_quad_has_the_same_seeds_when_it_is_produced_again() {
     gpu.close().unwrap();
 }
 
+/// All over a terrain of this side, and on every border and corner of it exactly.
+fn list(side: f64) -> Vec<TreePosition> {
+    let mut list: Vec<TreePosition> = (0..3000u32)
+        .map(|k| TreePosition {
+            x: side * f64::from(unit(hash(k))),
+            y: side * f64::from(unit(hash(k + 70_000))),
+            scale: (k % 2 == 0).then_some(0.3 + 0.001 * k as f32),
+            rotation: (k % 3 == 0).then_some(k as f32 * 0.731 - 900.0),
+        })
+        .collect();
+    for k in 0..=90 {
+        let v = side * f64::from(k) / 90.0;
+        for (x, y) in [(v, 0.0), (v, side), (0.0, v), (side, v)] {
+            list.push(TreePosition { x, y, scale: Some(1.0), rotation: Some(0.0) });
+        }
+    }
+    list
+}
+
+/// A side of a terrain whose far border lies, in singles from the last quad's corner, outside of it.
+fn awkward_side() -> f64 {
+    (0..500)
+        .map(|k| 300.0 + 0.37 * f64::from(k))
+        .find(|side| {
+            let mut scene = plain(*side, [0.0, 0.0]);
+            scene.species[0].distribution = Distribution::Positions(Arc::new(list(*side)));
+            let plan = Plan::new(&scene, &above(&scene), SIZE, false, None).unwrap();
+            let last = (side / plan.quad_side).ceil() - 1.0;
+            let position = (side - last * plan.quad_side) as f32;
+            last as f32 * plan.quad_side as f32 + position > *side as f32
+        })
+        .expect("one in eight is")
+}
+
 #[test]
 fn listed_trees_stand_where_the_list_says() {
     let gpu = device::open();
-    for (with_hills, side) in [(false, 450.0), (true, 450.0), (false, 333.37), (true, 417.13)] {
+    for (with_hills, side) in [(false, 450.0), (true, 450.0), (false, awkward_side()), (true, 417.13)] {
         let mut scene = plain(side, [0.0, 0.0]);
         if with_hills {
             hills(&mut scene);
         }
-        // All over, and on every border and corner of the terrain exactly.
-        let mut list: Vec<TreePosition> = (0..3000u32)
-            .map(|k| TreePosition {
-                x: side * f64::from(unit(hash(k))),
-                y: side * f64::from(unit(hash(k + 70_000))),
-                scale: (k % 2 == 0).then_some(0.3 + 0.001 * k as f32),
-                rotation: (k % 3 == 0).then_some(k as f32 * 0.731 - 900.0),
-            })
-            .collect();
-        for k in 0..=90 {
-            let v = side * f64::from(k) / 90.0;
-            for (x, y) in [(v, 0.0), (v, side), (0.0, v), (side, v)] {
-                list.push(TreePosition { x, y, scale: Some(1.0), rotation: Some(0.0) });
-            }
-        }
+        let list = list(side);
         scene.species[0].distribution = Distribution::Positions(Arc::new(list.clone()));
         let (all, plan) = produce(&gpu, &scene);
         let mut found: HashMap<u32, ([f64; 2], Seed)> = HashMap::new();
