@@ -175,8 +175,6 @@ fn as_many_seeds_as_the_density_says() {
     {
         (*m, *between_heights, *below_slope) = (Some(map.clone()), Some([-20.0, 40.0]), Some(45.0));
     }
-    let (all, plan) = produce(&gpu, &scene);
-    let points = positions(&all, plan.quad_side);
     // The densities' integrals by the midpoint rule, and over two halves, so that a mirrored map is seen.
     let heights = scene.terrain.heights.as_ref().unwrap();
     let (cell, side, n) = (scene.terrain.cell_size, scene.terrain.extent[0], 900);
@@ -204,18 +202,33 @@ fn as_many_seeds_as_the_density_says() {
         expected[0][usize::from(i >= n / 2)] += first * area;
         expected[1][usize::from(j >= n / 2)] += 0.08 * area;
     }
-    for species in 0..2u32 {
-        for half in 0..2 {
-            let inside = |p: &[f64; 2]| usize::from(p[species as usize] >= 0.5 * side) == half;
-            let count = points.iter().filter(|(p, s)| s.species == species && inside(p)).count() as f64;
-            let want = expected[species as usize][half];
-            println!("species {species} half {half}: {count} of {want:.1}");
-            // Thinning an even pattern varies less than a Poisson process, whose variance is its mean: five sigma.
-            assert!(
-                (count - want).abs() < 5.0 * want.sqrt(),
-                "species {species} half {half}: {count} of {want}"
-            );
+    // Several seeds of the scene: single counts, and their sum, in which a small bias would show.
+    let (mut found, mut points) = ([[0.0; 2]; 2], Vec::new());
+    for seed in 9..13 {
+        scene.seed = seed;
+        let (all, plan) = produce(&gpu, &scene);
+        points = positions(&all, plan.quad_side);
+        for species in 0..2 {
+            for half in 0..2 {
+                let inside = |p: &[f64; 2]| usize::from(p[species] >= 0.5 * side) == half;
+                let count =
+                    points.iter().filter(|(p, s)| s.species as usize == species && inside(p)).count() as f64;
+                let want: f64 = expected[species][half];
+                found[species][half] += count;
+                // Thinning an even pattern varies less than a Poisson process, whose variance is its mean: five sigma.
+                assert!(
+                    (count - want).abs() < 5.0 * want.sqrt(),
+                    "seed {seed}, species {species}: {count} of {want}"
+                );
+            }
         }
+    }
+    for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
+        println!("{found} of {:.1}", 4.0 * expected);
+        assert!(
+            (found - 4.0 * expected).abs() < 5.0 * (4.0 * expected).sqrt(),
+            "{found} of {expected}, four times"
+        );
     }
     for (p, s) in &points {
         assert!(p.iter().all(|v| (-1e-4..=side + 1e-4).contains(v)), "{p:?} is outside");
