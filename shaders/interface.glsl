@@ -4,6 +4,7 @@ const uint MAX_SPECIES = 8u;          // most species in a scene
 const uint MAX_CASCADES = 4u;         // most shadow cascades
 const uint DISTANCE_BINS = 32u;       // bins of the camera's list of trees, front to back
 const uint TREE_LISTS = 37u;          // lists that a seed can be in: all, one of the bins, each cascade
+const uint CAMERA_DRAWS = 3u;          // draws of the camera's list: near, middle and far bins
 const uint CULL_GROUP = 256u;         // seeds a workgroup of the cull
 const uint TERRAIN_CELLS = 32u;       // mesh cells along a side of a terrain quad
 const uint TERRAIN_HEIGHTS = 33u;     // height samples along a side of a terrain tile
@@ -164,6 +165,8 @@ struct CullParameters {
     uint groups_per_region;           // workgroups a region
     uint region_capacity;             // seeds a region
     uint tree_capacity;               // trees that fit
+    uint near_bins;                   // distance bins of the camera's first draw
+    uint far_bins;                    // first distance bin of its last
 };
 
 // One terrain quad to draw.

@@ -1,4 +1,4 @@
-// Surfaces along rays through a z-field: tests compare with src/physics/zfield.rs. The loop is that of the frame.
+// Surfaces along rays through a z-field: tests compare with src/physics/zfield.rs. The search is that of the frame.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
@@ -31,11 +31,10 @@ void main() {
         p[i] = vec3(dot(b.u.xyz, ray.origin.xyz), dot(b.v.xyz, ray.origin.xyz), dot(b.depth.xyz, ray.origin.xyz));
         d[i] = vec3(dot(b.u.xyz, ray.to.xyz), dot(b.v.xyz, ray.to.xyz), dot(b.depth.xyz, ray.to.xyz));
     }
-    int iterations = int(ray.to.w);
-    Surface at = Surface(0.0, 0.0, 0.0);
-    for (int n = 0; n < iterations; n++) {
-        float mip = ray.origin.w + (n == 0 && iterations > 1 ? 1.0 : 0.0);
-        at = zfield_fetch(views, p, d, vec3(layers), weights, mip, at.s, below, n == 0);
-    }
+    // Filtered where texels are magnified, as in frame/tree.vert.
+    uint before = uint(ray.to.w) - 1u;
+    bool magnified = ray.origin.w < 0.5;
+    Surface at = zfield_search(views, p, d, vec3(layers), weights, ray.origin.w, magnified ? 0u : before,
+                               magnified ? before : 0u, below);
     results.items[k] = vec4(at.s, at.opacity, at.occlusion, 0.0);
 }

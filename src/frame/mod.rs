@@ -212,3 +212,15 @@ pub fn auto_exposure(scene: &Scene) -> f64 {
     let radiance = 0.06 / std::f64::consts::PI * (luminance(light.sun) * up) + 0.06 * luminance(light.sky);
     if radiance > 0.0 { 0.15 / radiance } else { 1.0 }
 }
+
+/// The factor of an exposure in stops.
+///
+/// # Errors
+/// [`crate::Error::Usage`] unless it is a number from -64 to 64.
+pub fn check_exposure(ev: f64) -> Result<f64> {
+    if ev.is_finite() && ev.abs() <= 64.0 {
+        Ok(ev.exp2())
+    } else {
+        Err(crate::Error::Usage(format!("exposure {ev} EV; it takes -64 to 64")))
+    }
+}

@@ -2,6 +2,7 @@
 
 use super::camera::{Eye, NEAR_PLANE};
 use super::cascades::Cascade;
+use crate::forest::cull::bin_end;
 use crate::forest::seeds::SeedData;
 use crate::gpu::interface::{DISTANCE_BINS, View};
 use crate::physics::light::sun_disc_fraction;
@@ -94,10 +95,8 @@ pub fn view(
         view.cascade_texel[c] = cascade.texel as f32;
         view.cascade_far[c] = cascade.far as f32;
     }
-    // Bins of equal ratio: what matters for drawing front to back is relative distance.
-    let far = plan.range.max(2.0);
     for k in 0..DISTANCE_BINS as usize {
-        let d = far.powf((k + 1) as f64 / f64::from(DISTANCE_BINS));
+        let d = bin_end(k as u32, plan.range);
         view.bins[k / 4][k % 4] = (d * d) as f32;
     }
     let split = |p: [f64; 2], side: f64| {

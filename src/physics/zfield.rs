@@ -166,12 +166,7 @@ pub fn intersect(field: &ZField, level: usize, lookup: &Lookup, ray: &Ray, itera
         s += (found.s - s) * (4.0 * found.alpha).min(1.0);
     }
     let found = look(field, level, lookup, ray, s, sample, (lookup.below, iterations > 1));
-    Entry {
-        s: found.s,
-        point: ray.origin + found.s * ray.to,
-        alpha: found.alpha,
-        occlusion: found.occlusion,
-    }
+    Entry { s: found.s, point: ray.origin + found.s * ray.to, alpha: found.alpha, occlusion: found.occlusion }
 }
 
 /// The surface that a viewer at `c` sees on the ray through `through`, both in scaled tree space.
@@ -184,8 +179,7 @@ pub fn view_ray(field: &ZField, level: usize, c: DVec3, through: DVec3, iteratio
 /// on the plane through the centre on which the mean depth Σ wᵢ dᵢ is 0, and s counts from `p`.
 pub fn light_ray(field: &ZField, level: usize, p: DVec3, l: DVec3, iterations: u32) -> Entry {
     let lookup = views::lookup(field.n, l);
-    let mean: DVec3 =
-        lookup.views.iter().map(|v| v.weight * views::direction(field.n, v.i, v.j)).sum();
+    let mean: DVec3 = lookup.views.iter().map(|v| v.weight * views::direction(field.n, v.i, v.j)).sum();
     let ray = Ray { origin: p, to: l };
     let mut found = Look { s: -p.dot(mean) / l.dot(mean), ..Look::default() };
     for iteration in 0..iterations {

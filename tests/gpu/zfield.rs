@@ -20,6 +20,17 @@ const TEXEL: f64 = 2.0 / 256.0 + 1.0 / 255.0;
 /// Draws of errors a ray.
 const DRAWS: usize = 64;
 
+/// What an iteration is for, see `zfield::intersect`.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// Unfiltered: moves the point.
+    Estimate,
+    /// Filtered: moves the point; the number says which it is.
+    Filtered(u32),
+    /// Gives the result; after others or alone.
+    Last(bool),
+}
+
 /// One iteration at `s`, with errors added to the texels: (s, opacity, occlusion).
 fn step(
     field: &ZField,
@@ -27,7 +38,7 @@ fn step(
     lookup: &Lookup,
     ray: &Ray,
     s: f64,
-    first: bool,
+    kind: Kind,
     noise: &mut dyn FnMut() -> f64,
 ) -> [f64; 3] {
     let q = ray.origin + s * ray.to;
@@ -35,7 +46,13 @@ fn step(
     let (mut sum_k, mut alpha, mut occlusion, mut sum_s) = (0.0, 0.0, 0.0, 0.0);
     for view in &lookup.views {
         let basis = Basis::new(views::direction(field.n, view.i, view.j));
-        let (u, v) = zfield::project(field.resolution, &basis, q);
+        let (mut u, mut v) = zfield::project(field.resolution, &basis, q);
+        if kind == Kind::Estimate {
+            // The nearest texel's centre; single precision may take the one beside it.
+            let size = f64::from((field.resolution >> level).max(1));
+            let centre = |x: f64| ((x * size).floor().clamp(0.0, size - 1.0) + 0.5) / size;
+            (u, v) = (centre(u + 1e-4 * noise()), centre(v + 1e-4 * noise()));
+        }
         let t = zfield::sample(field, level, views::layer(field.n, view.i, view.j), u, v);
         // The texel's own components: (d + alpha sqrt 2) / (2 sqrt 2).
         let root = std::f64::consts::SQRT_2;
@@ -44,7 +61,7 @@ fn step(
         let a = (t.alpha + noise()).clamp(0.0, 1.0);
         let z = root * (2.0 * stored - a);
         let mut k = view.weight;
-        if !first && a > 0.0 {
+        if matches!(kind, Kind::Filtered(1..) | Kind::Last(true)) && a > 0.0 {
             let e = ((z / a - q.dot(basis.w)) / AGREEMENT).powi(2);
             k *= 1.0 - a * e / (1.0 + e);
         }
@@ -54,7 +71,7 @@ fn step(
         sum_s += k * (z - a * ray.origin.dot(basis.w)) / ray.to.dot(basis.w);
     }
     if alpha <= 0.0 {
-        return [0.0; 3];
+        return [s, 0.0, 0.0];
     }
     [sum_s / alpha, alpha / sum_k, occlusion / alpha]
 }
@@ -68,12 +85,13 @@ fn steps(
     noise: &mut dyn FnMut() -> f64,
 ) -> [f64; 3] {
     let lookup = views::lookup(field.n, ray.to);
-    let mut at = [0.0; 3];
-    for n in 0..iterations {
-        let coarser = usize::from(n == 0 && iterations > 1);
-        at = step(field, level + coarser, &lookup, ray, at[0], n == 0, noise);
+    let mut start = 0.0;
+    for n in 0..iterations - 1 {
+        let kind = if level == 0 { Kind::Filtered(n) } else { Kind::Estimate };
+        let at = step(field, level + 1, &lookup, ray, start, kind, noise);
+        start += (at[0] - start) * (4.0 * at[1]).min(1.0);
     }
-    at
+    step(field, level, &lookup, ray, start, Kind::Last(iterations > 1), noise)
 }
 
 fn rays(stream: &mut Stream) -> Vec<(Ray, usize, u32)> {
