@@ -24,6 +24,7 @@ fn hills() -> Scene {
         .collect();
     scene.terrain.heights = Some(Raster { width, height, samples });
     scene.terrain.cell_size = 30.0;
+    scene.settings.set("cascades", 4.0).unwrap();
     let place = |k: u32| TreePosition {
         x: f64::from(k % 60) * 15.0,
         y: f64::from(k / 60) * 21.0,

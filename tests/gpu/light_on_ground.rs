@@ -100,6 +100,32 @@ fn a_plain_is_as_far_and_as_bright_as_geometry_says() {
 }
 
 #[test]
+fn a_plain_to_the_horizon_is_flat_from_a_metre_above() {
+    let gpu = device::open();
+    for (side, height) in [(4e3, 1.7), (1e5, 1.7), (1e7, 1.7), (1e7, 1e4)] {
+        let mut scene = plain(35.0);
+        scene.terrain.extent = [side; 2];
+        // Not on a vertex of the mesh.
+        let [x, y] = [0.5137 * side, 0.4911 * side];
+        let camera = device::camera([x, y, height], [x + 10.0 * height, y + 7.0 * height, 0.0]);
+        let eye = Eye::new(&camera, &scene.terrain, SIZE);
+        let l = frame(&gpu, &scene, &camera);
+        let mut worst = Worst::default();
+        for k in 0..l.depth.len() {
+            let d = ray(&eye, k);
+            let t = -eye.position[2] / d[2];
+            if t > 0.0 && t < 0.3 * side {
+                worst.note((f64::from(l.depth[k]) / t - 1.0).abs(), || {
+                    format!("pixel {k}: {} {t}", l.depth[k])
+                });
+            }
+        }
+        worst.within(1e-3, &format!("depth of a plain of {side} m from {height} m"));
+    }
+    gpu.close().unwrap();
+}
+
+#[test]
 fn hills_gentler_than_the_sun_shade_nothing() {
     let gpu = device::open();
     for (elevation, amplitude) in [(60.0, 6.0), (35.0, 6.0), (20.0, 3.0), (89.9, 6.0)] {
