@@ -257,16 +257,22 @@ fn sums_over_many_workgroups_are_right_to_the_last() {
     let gpu = device::open();
     let mut scene = hills();
     scene.terrain.heights = None;
-    scene.terrain.extent = [450.0; 2];
     scene.species.remove(1);
     if let Distribution::Density { max_density, .. } = &mut scene.species[0].distribution {
         *max_density = 0.2;
     }
     scene.settings.set("zfield_min_pixels", 0.25).unwrap();
-    let camera = Camera { vertical_fov: 120.0, ..device::camera([225.0, 225.0, 270.0], [225.0, 225.0, 0.0]) };
-    let mut plan = Plan::new(&scene, &camera, [48, 48], false, Some(gpu.info())).unwrap();
-    // Sixteen quads of 32 workgroups: two a thread of the prefix sum, none to spare.
-    plan.region_capacity = 32 * CULL_GROUP;
+    let above = |side: f64| Camera {
+        vertical_fov: 120.0,
+        ..device::camera([0.5 * side, 0.5 * side, 0.6 * side], [0.5 * side, 0.5 * side, 0.0])
+    };
+    // Sixteen whole quads of 4096 points, sixteen workgroups each: one a thread of the prefix sum, and seeds in the last.
+    let plan =
+        |scene: &Scene, side| Plan::new(scene, &above(side), [48, 48], false, Some(gpu.info())).unwrap();
+    let side = 4.0 * plan(&scene, 450.0).quad_side;
+    scene.terrain.extent = [side; 2];
+    let (camera, mut plan) = (above(side), plan(&scene, side));
+    plan.region_capacity = 16 * CULL_GROUP;
     let baked = device::bake(&scene);
     let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), plan, &baked).unwrap();
     let (report, view) = renderer.render_eye(&Eye::new(&camera, &scene.terrain, [48, 48]), 1.0).unwrap();
