@@ -285,8 +285,8 @@ fn list(side: f64) -> Vec<TreePosition> {
         .map(|k| TreePosition {
             x: side * f64::from(unit(hash(k))),
             y: side * f64::from(unit(hash(k + 70_000))),
-            scale: (k % 2 == 0).then_some(0.3 + 0.001 * k as f32),
-            rotation: (k % 3 == 0).then_some(k as f32 * 0.731 - 900.0),
+            scale: k.is_multiple_of(2).then_some(0.3 + 0.001 * k as f32),
+            rotation: k.is_multiple_of(3).then_some(k as f32 * 0.731 - 900.0),
         })
         .collect();
     for k in 0..=90 {
@@ -344,7 +344,7 @@ fn listed_trees_stand_where_the_list_says() {
                 let turn = f64::from(s.turn_tint & 0xffff) / 65536.0;
                 let off = (turn - f64::from(degrees) / 360.0).rem_euclid(1.0);
                 // A step of 1/65536, cut; and the degrees as single.
-                assert!(off < 1e-6 || off > 1.0 - 1.1 / 65536.0, "{degrees}: {turn}");
+                assert!(!(1e-6..=1.0 - 1.1 / 65536.0).contains(&off), "{degrees}: {turn}");
             }
             let want = height_at(&scene.terrain, tree.x, tree.y);
             assert!((f64::from(s.ground) - want).abs() < 1e-3, "{tree:?}: ground at {} {want}", s.ground);
