@@ -4,6 +4,7 @@ const uint MAX_SPECIES = 8u;          // most species in a scene
 const uint MAX_CASCADES = 4u;         // most shadow cascades
 const uint DISTANCE_BINS = 32u;       // bins of the camera's list of trees, front to back
 const uint TREE_LISTS = 37u;          // lists that a seed can be in: all, one of the bins, each cascade
+const uint CAMERA_DRAWS = 3u;          // draws of the camera's list: near, middle and far bins
 const uint CULL_GROUP = 256u;         // seeds a workgroup of the cull
 const uint TERRAIN_CELLS = 32u;       // mesh cells along a side of a terrain quad
 const uint TERRAIN_HEIGHTS = 33u;     // height samples along a side of a terrain tile
@@ -40,7 +41,7 @@ struct View {
     float hotspot_width;              // a2 of BN12 eq. 8, 1/rad
     float ground_contrast;            // a3 of BN12 eq. 10
     float hole_radius;                // radius of the hole around a tree times sqrt(density), BN12 eq. 9
-    float mean_area;                  // mean horizontal area of a tree in the scene, m2
+    float range;                      // distance to which any tree is drawn one by one, m
     uint species_count;               // species in the scene
     uint samples;                     // samples a pixel
 };
@@ -65,6 +66,8 @@ struct Species {
     float height_softness;            // width of the smooth height limits, m
     vec2 map_size;                    // texels of its density map in use
     float slope_softness;             // width of the smooth slope limit, as a tangent
+    float crown_base;                 // height in scaled tree space under which there is only bark
+    vec3 bark;                        // reflectance of bark over albedo of leaves
     uint pad;                         // unused
 };
 
@@ -162,6 +165,8 @@ struct CullParameters {
     uint groups_per_region;           // workgroups a region
     uint region_capacity;             // seeds a region
     uint tree_capacity;               // trees that fit
+    uint near_bins;                   // distance bins of the camera's first draw
+    uint far_bins;                    // first distance bin of its last
 };
 
 // One terrain quad to draw.

@@ -50,6 +50,9 @@ pub struct Plan {
     pub species_range: Vec<f64>,
     /// The largest of these for any tree, m; 0 without trees.
     pub range: f64,
+    /// Distances under which texels of some tree are magnified, and from which every tree covers only a few pixels, m:
+    /// the search for its surface needs filtered estimates, or none.
+    pub draw_limits: [f64; 2],
     /// Height of the tallest tree, m.
     pub tallest: f64,
     /// Side of a seed quad, m.
@@ -100,6 +103,7 @@ impl Plan {
             shadow_distance: 0.0,
             species_range: Vec::new(),
             range: 0.0,
+            draw_limits: [0.0; 2],
             tallest: 0.0,
             quad_side: 1.0,
             tile_side: 1.0,
@@ -160,6 +164,10 @@ impl Plan {
             let reach = species.mesh.positions.iter().map(|p| p[0].hypot(p[1]).max(p[2])).fold(0.0, f32::max);
             self.tallest = self.tallest.max(f64::from(reach) * scale);
         }
+        // The box of a tree is no wider than twice its reach. Mip 0 is used up to sqrt 2 texels a pixel; and views 10 degrees
+        // apart differ by less than a pixel under about eleven pixels: sin 10 degrees of half the size.
+        let widest = 2.0 * self.tallest * eye.pixels_at_1m;
+        self.draw_limits = [widest * std::f64::consts::SQRT_2 / f64::from(s.view_resolution), widest / 11.0];
         if area_density <= 0.0 {
             self.range = 0.0;
             return;

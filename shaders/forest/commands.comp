@@ -1,4 +1,5 @@
-// Totals of the lists become draw commands: the camera's trees (bins one after the other), then each cascade's casters.
+// Totals of the lists become draw commands: the camera's trees (bins one after the other, in three draws), then each
+// cascade's casters.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
@@ -6,7 +7,7 @@
 layout(local_size_x = 1) in;
 layout(std430, binding = 0) readonly buffer Totals { uint items[]; } totals;
 layout(std430, binding = 1) writeonly buffer Commands { DrawCommand items[]; } commands;
-layout(std430, binding = 2) writeonly buffer Starts { uint items[]; } starts;
+layout(std430, binding = 2) buffer Starts { uint items[]; } starts;
 layout(push_constant) uniform Push { CullParameters p; };
 
 void main() {
@@ -19,11 +20,17 @@ void main() {
     }
     // Beyond the capacity nothing was written: the host reads the totals and refuses such a frame.
     bool fits = totals.items[0] <= p.tree_capacity;
-    commands.items[0] = DrawCommand(fits ? 6u * at : 0u, 1u, 0u, 0, 0u);
+    uint ends[CAMERA_DRAWS] = uint[](p.near_bins, p.far_bins, DISTANCE_BINS);
+    uint first = 0u;
+    for (uint k = 0u; k < CAMERA_DRAWS; k++) {
+        uint end = ends[k] < DISTANCE_BINS ? starts.items[1u + ends[k]] : at;
+        commands.items[k] = DrawCommand(fits ? 6u * (end - first) : 0u, 1u, 0u, int(4u * first), 0u);
+        first = end;
+    }
     for (uint c = 0u; c < MAX_CASCADES; c++) {
         uint list = 1u + DISTANCE_BINS + c;
         starts.items[list] = (1u + c) * p.tree_capacity;
-        commands.items[1u + c] =
+        commands.items[CAMERA_DRAWS + c] =
             DrawCommand(fits ? 6u * totals.items[list] : 0u, 1u, 0u, int(4u * (1u + c) * p.tree_capacity), 0u);
     }
 }

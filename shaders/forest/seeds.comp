@@ -54,7 +54,8 @@ bool candidate(SeedQuad q, uint index, uint pattern_count, out Seed s) {
         id = hash2(p.seed, hash2(uint(tile.x), hash2(uint(tile.y), slot)));
     }
     vec2 world = corner + s.position;
-    if (any(lessThan(world, vec2(0.0))) || any(greaterThan(world, p.extent))) return false;
+    // A listed tree is inside, whatever rounding does to its place on the border.
+    if (!is_listed && (any(lessThan(world, vec2(0.0))) || any(greaterThan(world, p.extent)))) return false;
     vec3 g = ground(q, s.position);
     float slope = length(g.yz), total = 0.0;
     float densities_here[MAX_SPECIES];

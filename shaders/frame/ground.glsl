@@ -42,9 +42,12 @@ void ground_light(out vec3 sun, out vec3 sky) {
         float texel = view.v.cascade_texel[c];
         vec3 from = position + n * (texel * 1.5 * sqrt(1.0 - cosine * cosine)) + view.v.sun_direction * (0.5 * texel);
         visible = sun_visibility(shadow_map, (view.v.cascade_from_world[c] * vec4(from, 1.0)).xyz, c);
+        // Shadows end smoothly, not at a line.
+        visible = mix(visible, 1.0, smoothstep(0.8, 1.0, distance / view.v.cascade_far[view.v.cascade_count - 1u]));
     }
     sun = reflectance * (cosine * visible / PI) * view.v.sun_irradiance;
-    vec2 cover = ground_coverage();
+    // And so do the trees above.
+    vec2 cover = ground_coverage() * (1.0 - smoothstep(0.8, 1.0, distance / view.v.range));
     float open = 0.5 * (1.0 + n.z) * ground_visibility(cover.y) *
                  ground_contrast(cover.x, cover.y, view.v.ground_contrast);
     sky = reflectance * open * view.v.sky_radiance;

@@ -16,7 +16,6 @@ layout(std430, binding = 5) readonly buffer Masks { uvec4 items[]; } masks;
 layout(constant_id = 0) const int RINGS = 9;
 layout(constant_id = 1) const float RESOLUTION = 256.0;
 layout(constant_id = 2) const uint MASK_ROWS = 12u;
-layout(constant_id = 4) const uint VIEW_ITERATIONS = 2u;
 
 layout(location = 0) out vec4 view_p[3];        // in the three views; w of the first: height in the tree
 layout(location = 3) out vec3 light_p[3];
@@ -29,8 +28,9 @@ layout(location = 17) flat out vec4 weights;    // of two views, of two light vi
 layout(location = 18) flat out vec4 optics;     // mip, extinction, opacity factor, height of the eye in the tree
 layout(location = 19) flat out vec4 sun;        // w: 1 / r2 of the hole
 layout(location = 20) flat out vec4 sky;        // w: metres from the centre to the top
-layout(location = 21) flat out uvec4 tree_bits; // mask row; cascade | from below << 4 | species << 8 | estimates << 16
+layout(location = 21) flat out uvec4 tree_bits; // mask row; cascade | from below << 4 | species << 8
 layout(location = 22) flat out float dither;
+layout(location = 23) flat out vec4 bark;       // relative colour; w: height under which there is only bark
 
 void main() {
     View v = view.v;
@@ -79,8 +79,7 @@ void main() {
     sun = vec4(t.sun, t.hole);
     sky = vec4(t.sky, half_extent.z);
     uvec3 row = masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz;
-    // Under about eight pixels the three views differ by less than a pixel: sin 7 degrees of half the size.
-    uint estimates = t.mip > log2(RESOLUTION) - 3.5 ? 0u : VIEW_ITERATIONS - 1u;
-    tree_bits = uvec4(row, t.cascade | (below ? 16u : 0u) | t.species << 8u | estimates << 16u);
+    tree_bits = uvec4(row, t.cascade | (below ? 16u : 0u) | t.species << 8u);
+    bark = vec4(kind.bark, kind.crown_base);
     dither = unit(hash(t.identity ^ HASH_DITHER));
 }

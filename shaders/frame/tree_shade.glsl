@@ -17,10 +17,13 @@ layout(location = 19) flat in vec4 sun;
 layout(location = 20) flat in vec4 sky;
 layout(location = 21) flat in uvec4 tree_bits;
 layout(location = 22) flat in float dither;
+layout(location = 23) flat in vec4 bark;
 
 layout(binding = 6) uniform sampler2DArray views;
 layout(binding = 7) uniform usampler2DArray shadow_map;
 layout(constant_id = 3) const uint SAMPLES = 4u;
+layout(constant_id = 4) const uint ESTIMATES = 1u;
+layout(constant_id = 7) const uint FILTERED_ESTIMATES = 0u;
 layout(constant_id = 5) const int LIGHT_ITERATIONS = 1;
 layout(constant_id = 6) const bool HAS_SUN = true;
 
@@ -31,18 +34,10 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
         p[i] = view_p[i].xyz;
         d[i] = view_c[i].xyz - p[i];
     }
-    vec3 inverse_depth = 1.0 / vec3(d[0].z, d[1].z, d[2].z);
     vec3 w = vec3(weights.xy, 1.0 - weights.x - weights.y);
     vec3 layers = vec3(view_c[0].w, view_c[1].w, view_c[2].w);
     bool below = (tree_bits.w >> 4u & 1u) != 0u;
-    // All but the last iteration only move the point: one coarser mip, so that a small hole before the start does not end
-    // the search, and no filter. Trees of a few pixels, whose parallax between views is under a pixel, have none.
-    float start = 0.0;
-    uint estimates = tree_bits.w >> 16u;
-    for (uint k = 0u; k < estimates; k++) {
-        start = zfield_estimate(views, p, d, inverse_depth, layers, w, optics.x + 1.0, start, below);
-    }
-    Surface at = zfield_fetch(views, p, d, inverse_depth, layers, w, optics.x, start, below, estimates > 0u);
+    Surface at = zfield_search(views, p, d, layers, w, optics.x, ESTIMATES, FILTERED_ESTIMATES, below);
     // Nothing behind the eye is seen: there s would be 1 or more.
     float s = clamp(at.s, -1e3, 0.999);
     float opacity = at.s < 0.999 ? at.opacity * optics.z : 0.0;
@@ -81,5 +76,9 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
     float height = mix(view_p[0].w, optics.w, s);
     float below_top = max(1.0 - height, 0.0) * sky.w;
     sky_part = sky.rgb * (at.occlusion / (1.0 + below_top * below_top * sun.w));
-    return (tree_bits.w >> 8u & 255u) + 1u;
+    // Under the crown there is only bark; half a metre or so of transition.
+    vec3 colour = mix(bark.rgb, vec3(1.0), smoothstep(bark.w - 0.05, bark.w + 0.05, height));
+    sun_part *= colour;
+    sky_part *= colour;
+    return (tree_bits.w >> 8u) + 1u;
 }

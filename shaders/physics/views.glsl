@@ -28,7 +28,8 @@ void view_lookup(vec3 w, int n, out uvec3 layers, out vec3 weights) {
     ivec2 c0 = lower ? c : c + 1;
     ivec2 c1 = lower ? c + ivec2(1, 0) : c + ivec2(0, 1);
     ivec2 c2 = lower ? c + ivec2(0, 1) : c + ivec2(1, 0);
-    weights = lower ? vec3(1.0 - f.x - f.y, f.x, f.y) : vec3(f.x + f.y - 1.0, 1.0 - f.x, 1.0 - f.y);
+    // 1 - f.x - f.y rounds twice and may end below 0 where f.x + f.y rounds to 1.
+    weights = max(lower ? vec3(1.0 - f.x - f.y, f.x, f.y) : vec3(f.x + f.y - 1.0, 1.0 - f.x, 1.0 - f.y), vec3(0.0));
     // Vertices outside the diamond have no weight but for rounding: any layer near serves.
     ivec3 ai = ivec3(c0.x, c1.x, c2.x), aj = ivec3(c0.y, c1.y, c2.y);
     for (int k = 0; k < 3; k++) {

@@ -15,13 +15,17 @@ struct Surface {
 // Depth by which a view may disagree with the point found so far before it counts half.
 const float AGREEMENT = 0.15;
 
+// How far an estimate moves the point: all the way to a surface of a quarter's opacity, continuously less for less. A
+// faint texel must not decide where to look, or silhouettes follow the borders of texels.
+float zfield_move(float s, float estimate, float opacity) { return mix(s, estimate, min(4.0 * opacity, 1.0)); }
+
 // A first estimate of s: one unfiltered texel from each view at p + s d, outside the view its border. Each view's surface
 // is at s_i = (z_i - depth_i(p)) / depth_i(d); their mean is weighted by opacity, which premultiplied texels give without
-// a division each. inverse_depth is 1 / depth_i(d). Keeps s where nothing is.
+// a division each. inverse_depth is 1 / depth_i(d). Where little or nothing is, s stays: see zfield_move.
 float zfield_estimate(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_depth, vec3 layers, vec3 weights, float mip,
                       float s, bool farthest) {
     float sum_s = 0.0, opacity = 0.0;
-    int level = int(mip);
+    int level = min(int(mip), textureQueryLevels(views) - 1);
     ivec2 last = textureSize(views, level).xy - 1;
     for (int i = 0; i < 3; i++) {
         ivec2 at = ivec2(floor((p[i].xy + s * d[i].xy + 0.5) * vec2(last + 1)));
@@ -30,7 +34,7 @@ float zfield_estimate(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_d
         sum_s += weights[i] * (z - t.a * p[i].z) * inverse_depth[i];
         opacity += weights[i] * t.a;
     }
-    return opacity > 0.0 ? sum_s / opacity : s;
+    return opacity > 0.0 ? zfield_move(s, sum_s / opacity, opacity) : s;
 }
 
 // The surface near q = p + s d, filtered. With `refine`, when q is more than the start of the search, a view whose surface
@@ -54,6 +58,23 @@ Surface zfield_fetch(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_de
     }
     float inverse = opacity > 0.0 ? 1.0 / opacity : 0.0;
     return Surface(opacity > 0.0 ? sum_s * inverse : s, opacity / max(sum_k, 1e-6), min(occlusion * inverse, 1.0));
+}
+
+// The surface on a ray: `estimates` unfiltered and `filtered` filtered iterations that only move the point, then one that
+// gives depth, opacity and occlusion. The former read one mip coarser, so that a small hole before the start does not end
+// the search.
+Surface zfield_search(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 layers, vec3 weights, float mip, uint estimates,
+                      uint filtered, bool farthest) {
+    vec3 inverse_depth = 1.0 / vec3(d[0].z, d[1].z, d[2].z);
+    float s = 0.0;
+    for (uint k = 0u; k < estimates; k++) {
+        s = zfield_estimate(views, p, d, inverse_depth, layers, weights, mip + 1.0, s, farthest);
+    }
+    for (uint k = 0u; k < filtered; k++) {
+        Surface at = zfield_fetch(views, p, d, inverse_depth, layers, weights, mip + 1.0, s, farthest, k > 0u);
+        s = zfield_move(s, at.s, at.opacity);
+    }
+    return zfield_fetch(views, p, d, inverse_depth, layers, weights, mip, s, farthest, estimates + filtered > 0u);
 }
 
 // Three 10-bit layers, as floats for the sampler.

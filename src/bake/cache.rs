@@ -19,8 +19,8 @@ use crate::scene::{Mesh, OpticsOverride};
 
 const MAGIC: [u8; 8] = *b"CANOPYZF";
 /// Goes into the key: to be raised with every change of the format or of what a bake computes.
-const VERSION: u32 = 2;
-const SCALARS: usize = 14;
+const VERSION: u32 = 5;
+const SCALARS: usize = 17;
 const HEADER: usize = 8 + 4 + 32 + 4 * SCALARS;
 const CHECKSUM: usize = 32;
 
@@ -123,7 +123,7 @@ pub fn path(dir: &Path, key: &[u8; 32]) -> PathBuf {
 }
 
 fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
-    let ([r0, r1, r2], [t0, t1, t2]) = (b.reflectance, b.transmittance);
+    let ([r0, r1, r2], [t0, t1, t2], [b0, b1, b2]) = (b.reflectance, b.transmittance, b.bark);
     [
         b.center,
         b.radius,
@@ -135,6 +135,9 @@ fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
         t0,
         t1,
         t2,
+        b0,
+        b1,
+        b2,
         b.area,
         b.crown_radius,
         b.crown_base,
@@ -204,6 +207,9 @@ fn read(path: &Path, key: &[u8; 32], settings: &BakeSettings) -> io::Result<Spec
         t0,
         t1,
         t2,
+        b0,
+        b1,
+        b2,
         area,
         crown_radius,
         crown_base,
@@ -217,6 +223,7 @@ fn read(path: &Path, key: &[u8; 32], settings: &BakeSettings) -> io::Result<Spec
         extinction,
         reflectance: [r0, r1, r2],
         transmittance: [t0, t1, t2],
+        bark: [b0, b1, b2],
         area,
         crown_radius,
         crown_base,

@@ -36,6 +36,8 @@ pub struct SpeciesBake {
     pub reflectance: [f32; 3],
     /// Leaf transmittance, linear RGB; with the reflectance it makes the single-scattering albedo.
     pub transmittance: [f32; 3],
+    /// Bark reflectance, linear RGB.
+    pub bark: [f32; 3],
     /// Horizontal projected area of the unscaled tree, m² (A of BN12 for scale 1).
     pub area: f32,
     /// Foliage (crown) half width, m.

@@ -20,7 +20,7 @@ use glam::{Vec2, Vec3};
 use super::surface::Surface;
 use super::{SpeciesBake, ZField};
 use crate::physics::views::{self, Basis};
-use crate::scene::{Mesh, OpticsOverride, Texture};
+use crate::scene::{Material, Mesh, OpticsOverride, Texture};
 
 /// Subdivisions a side of a triangle for measuring masks and colours: 256 equal parts, sampled in the middle.
 const PARTS: u32 = 16;
@@ -36,11 +36,36 @@ pub struct Leaves {
     pub color: [f64; 3],
     /// Height under which 2 % of the area lie, m.
     pub base: f32,
+    /// Mean linear colour of everything that is not foliage; that of the leaves where all is.
+    pub bark: [f64; 3],
 }
 
-/// Measures leaf area, colour and base height.
+/// Measures leaf area, colours and base height.
 pub fn leaves(mesh: &Mesh, surface: &Surface) -> Leaves {
     let foliage = surface.faces.iter().any(|f| mesh.materials[f.material as usize].foliage);
+    let (area, color, mut heights) = measure(mesh, surface, |m| !foliage || m.foliage);
+    let (bark_area, bark, _) = measure(mesh, surface, |m| !m.foliage);
+    heights.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut below = 0.0;
+    let base = heights.iter().find(|(_, a)| {
+        below += a;
+        below >= 0.02 * area
+    });
+    Leaves {
+        foliage,
+        area,
+        color,
+        base: base.map_or(0.0, |b| b.0),
+        bark: if bark_area > 0.0 { bark } else { color },
+    }
+}
+
+/// Area, mean linear colour, and (height, area) of each part, of the surface of some materials.
+fn measure(
+    mesh: &Mesh,
+    surface: &Surface,
+    keep: impl Fn(&Material) -> bool,
+) -> (f64, [f64; 3], Vec<(f32, f64)>) {
     let mut seen = HashSet::new();
     let (mut area, mut color) = (0.0, [0.0; 3]);
     // (height, area) of each part of a triangle row.
@@ -49,7 +74,7 @@ pub fn leaves(mesh: &Mesh, surface: &Surface) -> Leaves {
     for (i, x) in linear.iter_mut().enumerate() {
         *x = srgb_to_linear(i as f64 / 255.0);
     }
-    for face in surface.faces.iter().filter(|f| !foliage || mesh.materials[f.material as usize].foliage) {
+    for face in surface.faces.iter().filter(|f| keep(&mesh.materials[f.material as usize])) {
         let material = &mesh.materials[face.material as usize];
         let corners = face.p.map(|p| surface.frame.to_metres(p));
         let mut key = corners.map(|p| p.to_array().map(f32::to_bits));
@@ -72,18 +97,7 @@ pub fn leaves(mesh: &Mesh, surface: &Surface) -> Leaves {
             }
         }
     }
-    heights.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut below = 0.0;
-    let base = heights.iter().find(|(_, a)| {
-        below += a;
-        below >= 0.02 * area
-    });
-    Leaves {
-        foliage,
-        area,
-        color: color.map(|c| if area > 0.0 { c / area } else { 0.0 }),
-        base: base.map_or(0.0, |b| b.0),
-    }
+    (area, color.map(|c| if area > 0.0 { c / area } else { 0.0 }), heights)
 }
 
 /// Barycentric coordinates of the middles of a triangle's parts.
@@ -164,6 +178,7 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
         half_height: frame.half_height,
         extinction: stated.extinction.unwrap_or(measured),
         reflectance,
+        bark: stated.bark_reflectance.unwrap_or(leaves.bark.map(|c| c as f32)),
         // A leaf scatters no more than it gets.
         transmittance: std::array::from_fn(|i| transmittance[i].min(1.0 - reflectance[i])),
         area: area as f32,

@@ -7,8 +7,8 @@
 use super::seeds::SeedData;
 use super::species::SpeciesData;
 use crate::gpu::interface::{
-    CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, MAX_CASCADES, Seed, SeedQuad, Species,
-    TREE_LISTS, Tree, View,
+    CAMERA_DRAWS, CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, MAX_CASCADES, Seed, SeedQuad,
+    Species, TREE_LISTS, Tree, View,
 };
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, shaders};
 use crate::plan::Plan;
@@ -28,7 +28,7 @@ pub struct CullData {
     pub trees: Buffer,
     /// Indices into `trees`: the camera's, then each cascade's, `tree_capacity` apart.
     pub lists: Buffer,
-    /// Draw commands: the camera's, then each cascade's.
+    /// Draw commands: the camera's near, middle and far trees, then each cascade's.
     pub commands: Buffer,
     /// Number of trees in each list.
     pub totals: Buffer,
@@ -38,6 +38,9 @@ pub struct CullData {
     starts: Buffer,
     programs: [Program; 4],
     capacity: u32,
+    /// Distances under which a tree's texels may be magnified, and from which it covers few pixels, m.
+    draw_limits: [f64; 2],
+    range: f64,
 }
 
 /// How many trees a frame draws.
@@ -65,7 +68,10 @@ impl CullData {
         Ok(CullData {
             trees: gpu.buffer("trees", trees * size_of::<Tree>() as u64)?,
             lists: gpu.buffer("tree lists", trees * 4 * u64::from(1 + MAX_CASCADES))?,
-            commands: gpu.buffer("tree draws", 5 * size_of::<DrawCommand>() as u64)?,
+            commands: gpu.buffer(
+                "tree draws",
+                u64::from(CAMERA_DRAWS + MAX_CASCADES) * size_of::<DrawCommand>() as u64,
+            )?,
             totals: gpu.buffer("tree totals", 4 * u64::from(TREE_LISTS))?,
             classes: gpu.buffer("seed classes", slots * 4)?,
             counts: gpu.buffer("list counts", groups * 4 * u64::from(TREE_LISTS))?,
@@ -77,6 +83,8 @@ impl CullData {
                 gpu.compute(&shaders::FOREST_COMPACT_COMP, &constants)?,
             ],
             capacity: plan.tree_capacity,
+            draw_limits: plan.draw_limits,
+            range: plan.range,
         })
     }
 
@@ -88,6 +96,8 @@ impl CullData {
             groups_per_region,
             region_capacity: seeds.region_capacity,
             tree_capacity: self.capacity,
+            near_bins: first_bin_from(self.draw_limits[0], self.range),
+            far_bins: first_bin_from(self.draw_limits[1], self.range),
         };
         let shared = [
             ("view", Resource::Buffer(view)),
@@ -137,6 +147,17 @@ impl CullData {
             cascades: totals[bins.end..bins.end + cascades].to_vec(),
         })
     }
+}
+
+/// Distance to which a bin reaches, m: bins of equal ratio, because what matters for drawing front to back is relative
+/// distance. The last one has no end.
+pub fn bin_end(bin: u32, range: f64) -> f64 {
+    range.max(2.0).powf(f64::from(bin + 1) / f64::from(DISTANCE_BINS))
+}
+
+/// The first bin all of whose trees are at least this far.
+fn first_bin_from(distance: f64, range: f64) -> u32 {
+    (0..DISTANCE_BINS).find(|b| *b > 0 && bin_end(b - 1, range) >= distance).unwrap_or(DISTANCE_BINS)
 }
 
 /// Centre of a tree's box from the camera; twin of `tree_centre` in `shaders/forest/cull.glsl`, to the bit.

@@ -175,6 +175,9 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Arc<SpeciesBake>], view_count: u32)
             height_softness: if between.is_some() { 0.1 * (high - low) } else { 1.0 },
             map_size,
             slope_softness: if slope.is_some() { tangent / 6.0 } else { 1.0 },
+            crown_base: (bake.crown_base - bake.center) / bake.half_height,
+            // Black leaves have no colour to compare with.
+            bark: std::array::from_fn(|i| bake.bark[i] / bake.albedo()[i].max(1e-3)),
             pad: 0,
         });
     }

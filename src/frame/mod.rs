@@ -57,7 +57,6 @@ pub struct Renderer {
     sky: Option<SkyPass>,
     tonemap: Tonemap,
     forest: Option<Forest>,
-    mean_area: f64,
 }
 
 /// What a frame took and drew.
@@ -79,8 +78,6 @@ impl Renderer {
     /// # Errors
     /// [`crate::Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, scene: Arc<Scene>, plan: Plan, baked: &[Arc<SpeciesBake>]) -> Result<Self> {
-        let areas = scene.species.iter().zip(baked).map(|(_, b)| f64::from(b.area));
-        let mean_area = areas.sum::<f64>() / baked.len().max(1) as f64;
         let forest = if plan.range > 0.0 {
             let species = SpeciesData::new(gpu, &scene, &plan, baked)?;
             Some(Forest {
@@ -105,7 +102,6 @@ impl Renderer {
             scene,
             plan,
             forest,
-            mean_area,
         })
     }
 
@@ -147,7 +143,7 @@ impl Renderer {
         }
         let seeds = self.forest.as_ref().map(|f| &f.seeds);
         let step = self.terrain.tree.step();
-        let view = view::view(scene, plan, eye, &self.light, &cascades, seeds, step, self.mean_area);
+        let view = view::view(scene, plan, eye, &self.light, &cascades, seeds, step);
         gpu.upload(&self.view, 0, &[view])?;
 
         let mut recorder = gpu.record()?;
@@ -207,12 +203,24 @@ fn shadow_reach(sun: [f64; 3], cascades: u32, tall: f64) -> [f64; 3] {
     [-sun[0] * length, -sun[1] * length, -sun[2] * length]
 }
 
-/// The exposure at which a level forest floor of 6 % reflectance, under this sun and sky, is drawn at an eighth of the
+/// The exposure at which a level forest floor of 6 % reflectance, under this sun and sky, is drawn at a seventh of the
 /// display's linear range: forests are dark, and snow would be white.
 pub fn auto_exposure(scene: &Scene) -> f64 {
     let light = Light::new(scene);
     let luminance = |c: [f64; 3]| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
     let up = light.direction[2].max(0.2);
     let radiance = 0.06 / std::f64::consts::PI * (luminance(light.sun) * up) + 0.06 * luminance(light.sky);
-    if radiance > 0.0 { 0.12 / radiance } else { 1.0 }
+    if radiance > 0.0 { 0.15 / radiance } else { 1.0 }
+}
+
+/// The factor of an exposure in stops.
+///
+/// # Errors
+/// [`crate::Error::Usage`] unless it is a number from -64 to 64.
+pub fn check_exposure(ev: f64) -> Result<f64> {
+    if ev.is_finite() && ev.abs() <= 64.0 {
+        Ok(ev.exp2())
+    } else {
+        Err(crate::Error::Usage(format!("exposure {ev} EV; it takes -64 to 64")))
+    }
 }

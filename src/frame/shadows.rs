@@ -7,7 +7,7 @@ use crate::forest::cull::CullData;
 use crate::forest::seeds::SeedData;
 use crate::forest::species::SpeciesData;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
-use crate::gpu::interface::{DrawCommand, TERRAIN_CELLS, TerrainParameters};
+use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand, TERRAIN_CELLS, TerrainParameters};
 use crate::gpu::{
     Attachment, Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource,
     Sampler, Targets, Topology, shaders, vk,
@@ -133,7 +133,7 @@ impl Shadows {
             );
             for c in 0..self.map.layers() {
                 pass.push(&c);
-                let command = u64::from(1 + c) * size_of::<DrawCommand>() as u64;
+                let command = u64::from(CAMERA_DRAWS + c) * size_of::<DrawCommand>() as u64;
                 pass.draw_indexed_indirect(&seeds.quad_indices, &cull.commands, command);
             }
         });

@@ -3,6 +3,7 @@
 use super::Forest;
 use super::targets::ImageTargets;
 use crate::Result;
+use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand};
 use crate::gpu::{
     Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets,
     Topology, shaders,
@@ -12,7 +13,8 @@ use crate::scene::Scene;
 
 /// Draws z-field trees.
 pub struct Trees {
-    program: Program,
+    /// For the near, middle and far bins: with filtered estimates, with unfiltered ones, without.
+    programs: [Program; CAMERA_DRAWS as usize],
 }
 
 impl Trees {
@@ -23,25 +25,29 @@ impl Trees {
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, mask_rows: u32) -> Result<Self> {
         let s = &scene.settings;
         let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
-        let program = gpu.graphics(&GraphicsDesc {
-            vert: &shaders::FRAME_TREE_VERT,
-            frag: if plan.layers { &shaders::FRAME_TREE_LAYERS_FRAG } else { &shaders::FRAME_TREE_FRAG },
-            colors: &formats,
-            samples: plan.samples,
-            depth: DepthTest::Reverse,
-            blend: Blend::Replace,
-            topology: Topology::Triangles,
-            constants: &[
-                (0, s.view_rings),
-                (1, (s.view_resolution as f32).to_bits()),
-                (2, mask_rows),
-                (3, plan.samples),
-                (4, s.view_iterations),
-                (5, s.light_iterations),
-                (6, u32::from(plan.cascades > 0)),
-            ],
-        })?;
-        Ok(Trees { program })
+        let before = s.view_iterations - 1;
+        let program = |estimates: u32, filtered: u32| {
+            gpu.graphics(&GraphicsDesc {
+                vert: &shaders::FRAME_TREE_VERT,
+                frag: if plan.layers { &shaders::FRAME_TREE_LAYERS_FRAG } else { &shaders::FRAME_TREE_FRAG },
+                colors: &formats,
+                samples: plan.samples,
+                depth: DepthTest::Reverse,
+                blend: Blend::Replace,
+                topology: Topology::Triangles,
+                constants: &[
+                    (0, s.view_rings),
+                    (1, (s.view_resolution as f32).to_bits()),
+                    (2, mask_rows),
+                    (3, plan.samples),
+                    (4, estimates),
+                    (5, s.light_iterations),
+                    (6, u32::from(plan.cascades > 0)),
+                    (7, filtered),
+                ],
+            })
+        };
+        Ok(Trees { programs: [program(0, before)?, program(before, 0)?, program(0, 0)?] })
     }
 
     /// Records the pass.
@@ -59,20 +65,21 @@ impl Trees {
             if forest.seeds.visible == 0 {
                 return;
             }
-            pass.bind(
-                &self.program,
-                &[
-                    ("view", Resource::Buffer(view)),
-                    ("trees", Resource::Buffer(&forest.cull.trees)),
-                    ("lists", Resource::Buffer(&forest.cull.lists)),
-                    ("species", Resource::Buffer(&forest.species.table)),
-                    ("bases", Resource::Buffer(&forest.species.bases)),
-                    ("masks", Resource::Buffer(&forest.species.masks)),
-                    ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
-                    ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
-                ],
-            );
-            pass.draw_indexed_indirect(&forest.seeds.quad_indices, &forest.cull.commands, 0);
+            let bound = [
+                ("view", Resource::Buffer(view)),
+                ("trees", Resource::Buffer(&forest.cull.trees)),
+                ("lists", Resource::Buffer(&forest.cull.lists)),
+                ("species", Resource::Buffer(&forest.species.table)),
+                ("bases", Resource::Buffer(&forest.species.bases)),
+                ("masks", Resource::Buffer(&forest.species.masks)),
+                ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
+                ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+            ];
+            for (k, program) in self.programs.iter().enumerate() {
+                pass.bind(program, &bound);
+                let command = (k * size_of::<DrawCommand>()) as u64;
+                pass.draw_indexed_indirect(&forest.seeds.quad_indices, &forest.cull.commands, command);
+            }
         });
     }
 }

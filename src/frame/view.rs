@@ -2,6 +2,7 @@
 
 use super::camera::{Eye, NEAR_PLANE};
 use super::cascades::Cascade;
+use crate::forest::cull::bin_end;
 use crate::forest::seeds::SeedData;
 use crate::gpu::interface::{DISTANCE_BINS, View};
 use crate::physics::light::sun_disc_fraction;
@@ -75,7 +76,6 @@ pub fn view(
     cascades: &[Cascade],
     seeds: Option<&SeedData>,
     terrain_step: f64,
-    mean_area: f64,
 ) -> View {
     let s = &scene.settings;
     let mut view: View = bytemuck::Zeroable::zeroed();
@@ -95,10 +95,8 @@ pub fn view(
         view.cascade_texel[c] = cascade.texel as f32;
         view.cascade_far[c] = cascade.far as f32;
     }
-    // Bins of equal ratio: what matters for drawing front to back is relative distance.
-    let far = plan.range.max(2.0);
     for k in 0..DISTANCE_BINS as usize {
-        let d = far.powf((k + 1) as f64 / f64::from(DISTANCE_BINS));
+        let d = bin_end(k as u32, plan.range);
         view.bins[k / 4][k % 4] = (d * d) as f32;
     }
     let split = |p: [f64; 2], side: f64| {
@@ -126,7 +124,7 @@ pub fn view(
     view.hotspot_width = s.hotspot_width;
     view.ground_contrast = s.ground_contrast;
     view.hole_radius = s.hole_radius;
-    view.mean_area = mean_area as f32;
+    view.range = plan.range.max(1.0) as f32;
     view.species_count = scene.species.len() as u32;
     view.samples = plan.samples;
     view

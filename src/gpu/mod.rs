@@ -20,6 +20,8 @@ pub use ash::vk;
 pub use context::{Gpu, GpuOptions};
 pub use memory::{Buffer, Image, ImageDesc};
 pub use program::{Blend, DepthTest, GraphicsDesc, Program, Sampler, Topology};
+#[doc(hidden)]
+pub use record::Fault;
 pub use record::{Attachment, ComputePass, PassTime, Recorder, RenderPass, Resource, Targets, Work};
 pub use select::{DeviceInfo, devices, find};
 

@@ -55,6 +55,16 @@ pub struct Targets<'a> {
     pub layers: u32,
 }
 
+/// What [`Recorder::fault_for_test`] does wrong.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// Core validation must report it.
+    CopyBeyondTheEnd,
+    /// Synchronization validation must report it.
+    WriteAfterWrite,
+}
+
 /// Records commands for one submission.
 pub struct Recorder<'g> {
     gpu: &'g Gpu,
@@ -246,6 +256,25 @@ impl<'g> Recorder<'g> {
             // SAFETY: the buffer is alive.
             unsafe { r.device().cmd_fill_buffer(r.cmd, buffer.handle, 0, vk::WHOLE_SIZE, word) };
         });
+    }
+
+    /// Records a deliberate fault, so that a test can prove that validation reports one. It is never submitted.
+    #[doc(hidden)]
+    pub fn fault_for_test(self, fault: Fault, buffer: &Buffer) {
+        let (device, b) = (self.device(), buffer.handle);
+        let half = buffer.bytes() / 2;
+        let copy = [vk::BufferCopy { src_offset: 0, dst_offset: half, size: half }];
+        let beyond = [vk::BufferCopy { src_offset: 0, dst_offset: buffer.bytes(), size: half }];
+        // SAFETY: recorded only: the recorder is dropped without a submission, so nothing runs.
+        unsafe {
+            match fault {
+                Fault::CopyBeyondTheEnd => device.cmd_copy_buffer(self.cmd, b, b, &beyond),
+                Fault::WriteAfterWrite => {
+                    device.cmd_copy_buffer(self.cmd, b, b, &copy);
+                    device.cmd_copy_buffer(self.cmd, b, b, &copy);
+                }
+            }
+        }
     }
 
     /// Submits, waits, and returns the GPU time of every pass in order.

@@ -86,57 +86,87 @@ pub struct Entry {
 /// Depth, in scaled tree space, by which a view may disagree with the point found so far before it counts half.
 pub const AGREEMENT: f64 = 0.15;
 
-/// The surface of the tree on a ray, towards the end that the ray's direction points to, by
-/// `iterations` ≥ 1 fixed-point iterations over the three views of `lookup` (weights wᵢ).
+/// What one look into the three views gives.
+#[derive(Clone, Copy, Debug, Default)]
+struct Look {
+    s: f64,
+    alpha: f64,
+    occlusion: f64,
+}
+
+/// Projects q = p₀ + s·to into the views (texels Zᵢ, αᵢ, premultiplied) and solves, for each,
+/// dᵢ(p₀) + s dᵢ(to) = zᵢ with dᵢ(x) = x·wᵢ; the premultiplied mean over the views is
 ///
-/// Each iteration projects the current point q into the views (texels Zᵢ, αᵢ, premultiplied) and solves, for
-/// each, dᵢ(p₀) + s dᵢ(to) = zᵢ with dᵢ(x) = x·wᵢ; the premultiplied mean over the views is
+/// s = Σ kᵢ (Zᵢ − αᵢ dᵢ(p₀))/dᵢ(to) / Σ kᵢ αᵢ,   α = Σ kᵢ αᵢ / Σ kᵢ.
 ///
-/// s = Σ kᵢ (Zᵢ − αᵢ dᵢ(p₀))/dᵢ(to) / Σ kᵢ αᵢ,   q = p₀ + s·to,   α = Σ kᵢ αᵢ / Σ kᵢ,
-///
-/// and q = p₀ at the start. Two things go beyond BN12:
-///
-/// - kᵢ = wᵢ (1 − αᵢ eᵢ/(1 + eᵢ)), eᵢ = ((zᵢ − dᵢ(q))/σ)² with σ = [`AGREEMENT`], from the second iteration on
-///   (kᵢ = wᵢ in the first, where q is only a guess). A view whose surface lies far from q shows another
-///   branch there, before or behind, and knows nothing about q. In the plain mean it adds its opacity all the
-///   same (silhouettes 3 % too large) and pulls the depth to between the branches. As αᵢ → 0, kᵢ → wᵢ: the
-///   weights stay continuous at holes.
-/// - The first of several iterations reads one mip coarser, so that a small hole in front of p₀ does not end
-///   the search.
-///
-/// Opacity and occlusion are of the last iteration, from the same texels as the depth. From below, the views
-/// are looked at from behind: the surface nearest to that viewer is the farthest one along wᵢ; its occlusion
-/// is that of the other side, the only one stored.
-pub fn intersect(field: &ZField, level: usize, lookup: &Lookup, ray: &Ray, iterations: u32) -> Entry {
-    let mut entry = Entry { s: 0.0, point: ray.origin, alpha: 0.0, occlusion: 0.0 };
-    for iteration in 0..iterations {
-        let coarser = usize::from(iteration == 0 && iterations > 1);
-        let level = (level + coarser).min(field.levels.len() - 1);
-        let (mut sum_k, mut sum_alpha, mut sum_occlusion, mut sum_s) = (0.0, 0.0, 0.0, 0.0);
-        for view in &lookup.views {
-            let basis = Basis::new(views::direction(field.n, view.i, view.j));
-            let (u, v) = project(field.resolution, &basis, entry.point);
-            let texel = sample(field, level, views::layer(field.n, view.i, view.j), u, v);
-            let z = if lookup.below { texel.farthest } else { texel.nearest };
-            let mut k = view.weight;
-            if iteration > 0 && texel.alpha > 0.0 {
-                let e = ((z / texel.alpha - entry.point.dot(basis.w)) / AGREEMENT).powi(2);
-                k *= 1.0 - texel.alpha * e / (1.0 + e);
-            }
-            sum_k += k;
-            sum_alpha += k * texel.alpha;
-            sum_occlusion += k * texel.occlusion;
-            sum_s += k * (z - texel.alpha * ray.origin.dot(basis.w)) / ray.to.dot(basis.w);
+/// kᵢ is the view's weight wᵢ, or with `refine`, when q is more than the start of the search,
+/// kᵢ = wᵢ (1 − αᵢ eᵢ/(1 + eᵢ)), eᵢ = ((zᵢ − dᵢ(q))/σ)² with σ = [`AGREEMENT`]: a view whose surface lies far from q shows
+/// another branch there, before or behind, and knows nothing about q. In the plain mean it adds its opacity all the same
+/// (silhouettes 3 % too large) and pulls the depth to between the branches. As αᵢ → 0, kᵢ → wᵢ: the weights stay
+/// continuous at holes. Where nothing is, s stays.
+fn look(
+    field: &ZField,
+    level: usize,
+    lookup: &Lookup,
+    ray: &Ray,
+    s: f64,
+    texel: fn(&ZField, usize, u32, f64, f64) -> Texel,
+    (farthest, refine): (bool, bool),
+) -> Look {
+    let level = level.min(field.levels.len() - 1);
+    let q = ray.origin + s * ray.to;
+    let (mut sum_k, mut sum_s, mut sum) = (0.0, 0.0, Look::default());
+    for view in &lookup.views {
+        let basis = Basis::new(views::direction(field.n, view.i, view.j));
+        let (u, v) = project(field.resolution, &basis, q);
+        let t = texel(field, level, views::layer(field.n, view.i, view.j), u, v);
+        let z = if farthest { t.farthest } else { t.nearest };
+        let mut k = view.weight;
+        if refine && t.alpha > 0.0 {
+            let e = ((z / t.alpha - q.dot(basis.w)) / AGREEMENT).powi(2);
+            k *= 1.0 - t.alpha * e / (1.0 + e);
         }
-        if sum_alpha <= 0.0 {
-            return Entry { alpha: 0.0, occlusion: 0.0, ..entry };
-        }
-        entry.s = sum_s / sum_alpha;
-        entry.alpha = sum_alpha / sum_k;
-        entry.occlusion = sum_occlusion / sum_alpha;
-        entry.point = ray.origin + entry.s * ray.to;
+        sum_k += k;
+        sum.alpha += k * t.alpha;
+        sum.occlusion += k * t.occlusion;
+        sum_s += k * (z - t.alpha * ray.origin.dot(basis.w)) / ray.to.dot(basis.w);
     }
-    entry
+    if sum.alpha <= 0.0 {
+        return Look { s, alpha: 0.0, occlusion: 0.0 };
+    }
+    Look {
+        s: sum_s / sum.alpha,
+        alpha: sum.alpha / sum_k.max(1e-6),
+        occlusion: (sum.occlusion / sum.alpha).min(1.0),
+    }
+}
+
+/// The texel at a position, unfiltered; outside, that of the border.
+fn nearest(field: &ZField, level: usize, layer: u32, u: f64, v: f64) -> Texel {
+    let size = f64::from((field.resolution >> level).max(1));
+    let centre = |x: f64| ((x * size).floor().clamp(0.0, size - 1.0) + 0.5) / size;
+    sample(field, level, layer, centre(u), centre(v))
+}
+
+/// The surface of the tree on a ray, towards the end that the ray's direction points to, by `iterations` ≥ 1 fixed-point
+/// iterations over the three views of `lookup`.
+///
+/// All but the last only move the point. They read one mip coarser, so that a small hole before p₀ does not end the
+/// search, unfiltered unless texels are magnified (level 0), and move by as much as four times the opacity that they
+/// find, at most all the way: a faint texel must not decide where to look, or silhouettes follow the borders of texels.
+/// Opacity, occlusion and depth are of the last iteration, from the same texels. From below, the views are looked at from
+/// behind: the surface nearest to that viewer is the farthest one along wᵢ; its occlusion is that of the other side, the
+/// only one stored.
+pub fn intersect(field: &ZField, level: usize, lookup: &Lookup, ray: &Ray, iterations: u32) -> Entry {
+    let mut s = 0.0;
+    for iteration in 1..iterations {
+        let (texel, refine): (fn(&_, _, _, _, _) -> _, _) =
+            if level == 0 { (sample, iteration > 1) } else { (nearest, false) };
+        let found = look(field, level + 1, lookup, ray, s, texel, (lookup.below, refine));
+        s += (found.s - s) * (4.0 * found.alpha).min(1.0);
+    }
+    let found = look(field, level, lookup, ray, s, sample, (lookup.below, iterations > 1));
+    Entry { s: found.s, point: ray.origin + found.s * ray.to, alpha: found.alpha, occlusion: found.occlusion }
 }
 
 /// The surface that a viewer at `c` sees on the ray through `through`, both in scaled tree space.
@@ -145,7 +175,16 @@ pub fn view_ray(field: &ZField, level: usize, c: DVec3, through: DVec3, iteratio
     intersect(field, level, &views::lookup(field.n, c), &ray, iterations)
 }
 
-/// Where light from the direction `l` (scaled tree space, any length) on its way to `p` enters the tree.
+/// Where light from the direction `l` (scaled tree space, any length) on its way to `p` enters the tree: the search starts
+/// on the plane through the centre on which the mean depth Σ wᵢ dᵢ is 0, and s counts from `p`.
 pub fn light_ray(field: &ZField, level: usize, p: DVec3, l: DVec3, iterations: u32) -> Entry {
-    intersect(field, level, &views::lookup(field.n, l), &Ray { origin: p, to: l }, iterations)
+    let lookup = views::lookup(field.n, l);
+    let mean: DVec3 = lookup.views.iter().map(|v| v.weight * views::direction(field.n, v.i, v.j)).sum();
+    let ray = Ray { origin: p, to: l };
+    let mut found = Look { s: -p.dot(mean) / l.dot(mean), ..Look::default() };
+    for iteration in 0..iterations {
+        let from = found.s;
+        found = look(field, level, &lookup, &ray, from, sample, (false, iteration > 0));
+    }
+    Entry { s: found.s, point: p + found.s * l, alpha: found.alpha, occlusion: found.occlusion }
 }

@@ -1,0 +1,61 @@
+// Evaluates one pure function of shaders/physics on an array of inputs: tests compare with src/physics.
+// Words are bits: floats go through uintBitsToFloat, so that integers pass unharmed.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "physics/hash.glsl"
+#include "physics/views.glsl"
+#include "physics/light.glsl"
+#include "physics/masks.glsl"
+#include "physics/shadow.glsl"
+#include "physics/tonemap.glsl"
+
+struct Arguments {
+    uvec4 a;
+    uvec4 b;
+    uvec4 c;
+};
+struct Result {
+    uvec4 a;
+    uvec4 b;
+};
+
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) readonly buffer Inputs { Arguments items[]; } inputs;
+layout(std430, binding = 1) writeonly buffer Results { Result items[]; } results;
+layout(push_constant) uniform Push { uint count; };
+layout(constant_id = 0) const uint FUNCTION = 0u;
+
+void main() {
+    uint k = gl_GlobalInvocationID.x;
+    if (k >= count) return;
+    Arguments i = inputs.items[k];
+    vec4 a = uintBitsToFloat(i.a), b = uintBitsToFloat(i.b), c = uintBitsToFloat(i.c);
+    Result r = Result(uvec4(0u), uvec4(0u));
+    switch (FUNCTION) {
+        case 0u: r.a = uvec4(hash(i.a.x), hash2(i.a.x, i.a.y), floatBitsToUint(unit(i.a.x)), 0u); break;
+        case 1u: {
+            uvec3 layers;
+            vec3 weights;
+            view_lookup(a.xyz, int(i.a.w), layers, weights);
+            r.a.xyz = layers;
+            r.b.xyz = floatBitsToUint(weights);
+            break;
+        }
+        case 2u: r.a.xy = floatBitsToUint(vec2(angle_between(a.xyz, b.xyz), hotspot(a.xyz, b.xyz, c.x, c.y))); break;
+        case 3u: r.a.xyz = floatBitsToUint(leaf_phase(a.xyz, b.xyz, vec3(c.x, a.w, c.z), vec3(c.y, b.w, c.w))); break;
+        case 4u: r.a.x = floatBitsToUint(hole_occlusion(a.x, a.y)); break;
+        case 5u: r.a.x = floatBitsToUint(ground_visibility(a.x)); break;
+        case 6u: r.a.x = floatBitsToUint(ground_contrast(a.x, a.y, a.z)); break;
+        case 7u: r.a.x = covered_samples(a.x, a.y, i.a.z); break;
+        case 8u: r.a.x = mask_column(i.a.xyz, i.b.x, i.b.y); break;
+        case 9u: {
+            uint caster = pack_caster(a.x, a.y);
+            r.a.xy = uvec2(caster, floatBitsToUint(caster_visibility(caster, a.z)));
+            break;
+        }
+        case 10u: r.a.xyz = floatBitsToUint(tone_curve(a.xyz)); break;
+        case 11u: r.a.xyz = floatBitsToUint(srgb(a.xyz)); break;
+        case 12u: r.a.x = view_layer(int(i.a.x), int(i.a.y), int(i.a.z)); break;
+    }
+    results.items[k] = r;
+}

@@ -1,0 +1,229 @@
+//! Functions of light, shadow texels, display curve and hashes, against their twins in f64.
+//!
+//! Bounds come from what Vulkan promises of single precision: + - * exact to half an ulp, / 2.5 ulp, sin and cos within
+//! 2^-11, atan 4096 ulp, exp (3 + 2|x|) ulp, log and pow built from those.
+
+use crate::device::{self, Arguments, Function, Worst, evaluate, float, words};
+use canopy::physics::{hash, light, shadow, tonemap};
+use std::f64::consts::PI;
+
+/// Relative rounding of a single operation.
+const EPS: f64 = 6e-8;
+/// Of atan, relative: 4096 ulp.
+const ATAN: f64 = 4096.0 * 2.0 * EPS;
+
+/// Two unit vectors with an angle between them, turned about some axis.
+fn pair(angle: f64, turn: f64) -> [[f32; 3]; 2] {
+    let frame = glam::DQuat::from_euler(glam::EulerRot::ZYX, turn, 0.7 * turn + 0.3, 1.9 * turn);
+    let a = frame * glam::DVec3::X;
+    let b = frame * glam::DVec3::new(angle.cos(), angle.sin(), 0.0);
+    [a.as_vec3().into(), b.as_vec3().into()]
+}
+
+/// The angle of the vectors as stored: rounding moves it by up to two ulps.
+fn angle([v, l]: [[f32; 3]; 2]) -> f64 {
+    light::angle_between(v.map(f64::from), l.map(f64::from))
+}
+
+/// Pairs at ordinary and extreme angles; among them v = l and v = -l to the bit.
+fn pairs() -> Vec<[[f32; 3]; 2]> {
+    let mut all = Vec::new();
+    for turn in 0..23 {
+        let turn = f64::from(turn) * 0.37;
+        for k in 0..60 {
+            all.push(pair(PI * f64::from(k) / 59.0, turn));
+        }
+        for k in 1..8 {
+            let tiny = 10f64.powi(-k);
+            all.extend([pair(tiny, turn), pair(PI - tiny, turn)]);
+        }
+        let [v, _] = pair(0.0, turn);
+        all.extend([[v, v], [v, v.map(|x| -x)]]);
+    }
+    all
+}
+
+#[test]
+fn hotspot_is_that_of_the_oracle_down_to_no_angle_at_all() {
+    let gpu = device::open();
+    let pairs = pairs();
+    for (a1, a2) in [(0.2f32, 20.0f32), (1.0, 1000.0), (0.0, 0.0), (1.0, 0.0)] {
+        let arguments: Vec<Arguments> = pairs
+            .iter()
+            .map(|[v, l]| words(&[v[0], v[1], v[2], 0.0, l[0], l[1], l[2], 0.0, a1, a2]))
+            .collect();
+        let (mut angles, mut values) = (Worst::default(), Worst::default());
+        for (p, out) in pairs.iter().zip(evaluate(&gpu, Function::Hotspot, &arguments)) {
+            let at = angle(*p);
+            // Of the cross product, near 0 and pi: products of components up to 1 cancel to within 2 ulp of 1.
+            angles.note((float(&out, 0) - at).abs() / (ATAN * at + 4.0 * EPS), || format!("{at} {p:?}"));
+            let want = light::hotspot(at, f64::from(a1), f64::from(a2));
+            // exp' <= 1 times the error of a2 angle, and exp's own: (3 + 2x) ulp of exp(-x), at most 4 ulp.
+            let slope = f64::from(a1) * f64::from(a2) * (-f64::from(a2) * at).exp();
+            // The exponential's slope is largest at the smaller end of the uncertain angle: twice covers it.
+            let error = slope * 2.0 * (ATAN * at + 4.0 * EPS) + 16.0 * EPS;
+            values.note((float(&out, 1) - want).abs() / error, || {
+                format!("{at} a1 {a1} a2 {a2}: {out:?} {want}")
+            });
+            if p[0] == p[1] {
+                assert_eq!(float(&out, 1), 1.0, "largest at v = l, exactly");
+            }
+        }
+        angles.within(1.0, "angle, in units of its bound");
+        values.within(1.0, "hotspot, in units of its bound");
+    }
+    gpu.close().unwrap();
+}
+
+#[test]
+fn leaf_phase_is_that_of_the_oracle_and_never_negative() {
+    let gpu = device::open();
+    let pairs = pairs();
+    for (r, t) in [([0.1f32, 0.5, 0.0], [0.05f32, 0.45, 0.3]), ([0.3, 1.0, 0.0], [0.0, 0.0, 0.0])] {
+        let arguments: Vec<Arguments> = pairs
+            .iter()
+            .map(|[v, l]| words(&[v[0], v[1], v[2], r[1], l[0], l[1], l[2], t[1], r[0], t[0], r[2], t[2]]))
+            .collect();
+        let mut worst = Worst::default();
+        for (p, out) in pairs.iter().zip(evaluate(&gpu, Function::LeafPhase, &arguments)) {
+            let at = angle(*p);
+            for k in 0..3 {
+                let want = light::leaf_phase(at, f64::from(r[k]), f64::from(t[k]));
+                let got = float(&out, k);
+                assert!(got >= 0.0, "{got} at {at}");
+                worst.note((got - want).abs(), || format!("{at} r {} t {}: {got} {want}", r[k], t[k]));
+            }
+        }
+        // sin and cos to 2^-11 each: (2/pi) ((r + t)(1 + pi)/(3 pi) + t/3) 2^-11 with r + t = 1 and t = 0.45 is
+        // 0.38 * 2^-11; the angle's 4096 ulp times the slope's largest, (2/pi)(pi/(3 pi) + 0.15), add 0.3 * ATAN * pi.
+        worst.within(0.4 / 2048.0 + ATAN, "leaf phase");
+    }
+    gpu.close().unwrap();
+}
+
+#[test]
+fn sky_through_holes_and_over_the_ground_is_that_of_the_oracle() {
+    let gpu = device::open();
+    let depths = [0.0f32, 1e-20, 1e-3, 0.5, 1.0, 7.0, 30.0, 1e4, 1e10];
+    let cases: Vec<[f32; 2]> =
+        depths.iter().flat_map(|d| [0.0, 1e-12, 0.01, 1.0, 1e6].map(|i| [*d, i])).collect();
+    let arguments: Vec<Arguments> = cases.iter().map(|c| words(c)).collect();
+    let mut worst = Worst::default();
+    for (c, out) in cases.iter().zip(evaluate(&gpu, Function::HoleOcclusion, &arguments)) {
+        let want = light::hole_occlusion(f64::from(c[0]), f64::from(c[1]));
+        worst.note((float(&out, 0) - want).abs(), || format!("{c:?}: {want}"));
+    }
+    // Two products, a sum and a division of a value of at most 1.
+    worst.within(8.0 * EPS, "hole occlusion");
+
+    let mut xs: Vec<f32> = (-300..=90).map(|k| 10f32.powf(k as f32 * 0.025)).collect();
+    xs.extend([0.0, 1e-38, 9.999e-5, 1.0001e-4, 39.99, 40.01, 1e6, 1e30]);
+    let arguments: Vec<Arguments> = xs.iter().map(|x| words(&[*x])).collect();
+    let mut worst = Worst::default();
+    for (x, out) in xs.iter().zip(evaluate(&gpu, Function::GroundVisibility, &arguments)) {
+        let (got, want) = (float(&out, 0), light::ground_visibility(f64::from(*x).min(700.0)));
+        assert!((0.0..=1.0).contains(&got), "{got} at {x}");
+        worst.note((got - want).abs(), || format!("x = {x}: {got} {want}"));
+    }
+    // E1 to 2e-7 times x2 <= 1; exp (3 + 2x ulp) times 1 + x - x e1 exp(x) <= 2: 2 exp(-x) (5 + 2x) half ulps; log 3 ulp;
+    // a dozen roundings of numbers up to 1 on the way.
+    worst.within(2e-7 + 20.0 * 1.2e-7, "ground visibility");
+
+    let cases = [
+        [0.0f32, 0.0, 1.0],
+        [1.0, 0.3, 1.0],
+        [0.0, 1.0, 4.0],
+        [1.0, 0.0, 4.0],
+        [0.5, 0.5, 0.0],
+        [0.7, 0.2, 2.0],
+    ];
+    let arguments: Vec<Arguments> = cases.iter().map(|c| words(c)).collect();
+    for (c, out) in cases.iter().zip(evaluate(&gpu, Function::GroundContrast, &arguments)) {
+        let want = light::ground_contrast(f64::from(c[0]), f64::from(c[1]), f64::from(c[2]));
+        // A difference, a product and a difference of numbers up to 5.
+        assert!((float(&out, 0) - want).abs() <= 3.0 * 5.0 * EPS, "{c:?} {want} {}", float(&out, 0));
+    }
+    gpu.close().unwrap();
+}
+
+#[test]
+fn casters_are_packed_as_the_oracle_packs_them() {
+    let gpu = device::open();
+    let mut cases = Vec::new();
+    for k in 0..=400 {
+        let d = k as f32 / 400.0;
+        cases.push([d, 1.0 - d, 0.5]);
+        cases.push([d, d * 0.7, d]);
+    }
+    cases.extend([
+        [-1.0, -1.0, 0.0],
+        [2.0, 2.0, 0.999],
+        [1.0, 0.0, 2.0],
+        [0.0, 1.0, -1.0],
+        [1e30, 1e30, 0.3],
+    ]);
+    let arguments: Vec<Arguments> = cases.iter().map(|c| words(c)).collect();
+    for (c, out) in cases.iter().zip(evaluate(&gpu, Function::Caster, &arguments)) {
+        let want = shadow::pack_caster(f64::from(c[0]), f64::from(c[1]));
+        // Products are rounded before they are cut: one step of depth (24 bits), one of opacity at a tie.
+        assert!((out[0] >> 8).abs_diff(want >> 8) <= 1, "{c:?}: {:x} {want:x}", out[0]);
+        assert!((out[0] & 255).abs_diff(want & 255) <= 1, "{c:?}: {:x} {want:x}", out[0]);
+        // The same texel gives the same light, unless the depths are equal but for rounding.
+        let depth = f64::from(c[2]);
+        if (f64::from(out[0] >> 8) / 16_777_215.0 - depth).abs() > 1e-6 {
+            let want = shadow::caster_visibility(out[0], depth);
+            assert!((float(&out, 1) - want).abs() <= 2.0 * EPS, "{c:?}: {want} {}", float(&out, 1));
+        }
+    }
+    gpu.close().unwrap();
+}
+
+#[test]
+fn the_display_curve_is_that_of_the_oracle() {
+    let gpu = device::open();
+    let mut colors = vec![[0.0f32; 3], [-1.0, 0.5, -1e30], [1e30; 3], [65504.0; 3], [1e-30, 1e-10, 1e-5]];
+    for k in 0..200 {
+        let x = 1e-4 * 1.08f32.powi(k);
+        colors.extend([[x; 3], [x, 0.1 * x, 3.0 * x], [0.0, 0.0, x]]);
+    }
+    let arguments: Vec<Arguments> = colors.iter().map(|c| words(c)).collect();
+    let mut worst = Worst::default();
+    for (c, out) in colors.iter().zip(evaluate(&gpu, Function::ToneCurve, &arguments)) {
+        let want = tonemap::tone_curve(c.map(f64::from));
+        for k in 0..3 {
+            worst.note((float(&out, k) - want[k]).abs(), || {
+                format!("{c:?}[{k}]: {} {}", float(&out, k), want[k])
+            });
+        }
+    }
+    // A dozen operations, a value of at most 1.
+    worst.within(16.0 * EPS, "tone curve");
+
+    let mut worst = Worst::default();
+    let mut xs: Vec<f32> = (0..=2000).map(|k| k as f32 / 2000.0).collect();
+    xs.extend([0.003_130_8, 0.003_130_81, 1e-30, 0.0]);
+    let arguments: Vec<Arguments> = xs.iter().map(|x| words(&[*x; 3])).collect();
+    for (x, out) in xs.iter().zip(evaluate(&gpu, Function::Srgb, &arguments)) {
+        worst.note((float(&out, 0) - tonemap::srgb(f64::from(*x))).abs(), || {
+            format!("{x}: {}", float(&out, 0))
+        });
+    }
+    // pow(x, y) = exp2(y log2 x): log2 to 3 ulp (of up to 8.3 here) and exp2 to (3 + 2 * 3.5) ulp of at most 1, which is
+    // 3e-6; a display has steps of 4e-3.
+    worst.within(4e-6, "sRGB");
+    gpu.close().unwrap();
+}
+
+#[test]
+fn hashes_are_equal_to_the_bit() {
+    let gpu = device::open();
+    let mut cases: Vec<[u32; 2]> = vec![[0, 0], [u32::MAX, 0], [0, u32::MAX], [u32::MAX; 2], [1 << 31, 1]];
+    let mut stream = hash::Stream::new(5);
+    cases.extend((0..20_000).map(|_| [stream.bits(), stream.bits()]));
+    let arguments: Vec<Arguments> =
+        cases.iter().map(|c| [c[0], c[1], 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]).collect();
+    for ([a, b], out) in cases.iter().zip(evaluate(&gpu, Function::Hash, &arguments)) {
+        assert_eq!(out[..3], [hash::hash(*a), hash::hash2(*a, *b), hash::unit(*a).to_bits()], "{a:x} {b:x}");
+    }
+    gpu.close().unwrap();
+}

@@ -1,0 +1,17 @@
+//! Tests that need a Vulkan device: one program, because each costs a link of the whole crate.
+
+#[path = "../common/device.rs"]
+mod device;
+
+mod cull;
+mod determinism;
+mod extremes;
+mod faults;
+mod ground;
+mod light;
+mod light_on_ground;
+mod masks;
+mod plan;
+mod seeds;
+mod views;
+mod zfield;
