@@ -27,7 +27,7 @@ fn hills() -> Scene {
     let place = |k: u32| TreePosition {
         x: f64::from(k % 60) * 15.0,
         y: f64::from(k / 60) * 21.0,
-        scale: (k % 3 == 0).then_some(0.2 + (k % 7) as f32),
+        scale: k.is_multiple_of(3).then_some(0.2 + (k % 7) as f32),
         rotation: None,
     };
     scene.species[1].distribution = Distribution::Positions(Arc::new((0..2400).map(place).collect()));

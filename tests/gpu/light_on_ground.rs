@@ -81,8 +81,8 @@ fn a_plain_is_as_far_and_as_bright_as_geometry_says() {
             } else if !inside(-1.0) {
                 assert_eq!(l.depth[k], 0.0, "pixel {k} shows the sky");
                 assert_eq!(l.sun[k], [0.0; 3]);
-                for c in 0..3 {
-                    sky.note((f64::from(l.sky[k][c]) / SKY[c] - 1.0).abs(), || {
+                for (drawn, given) in l.sky[k].iter().zip(SKY) {
+                    sky.note((f64::from(*drawn) / given - 1.0).abs(), || {
                         format!("pixel {k}: {:?}", l.sky[k])
                     });
                 }

@@ -339,7 +339,7 @@ fn listed_trees_stand_where_the_list_says() {
                 let turn = f64::from(s.turn_tint & 0xffff) / 65536.0;
                 let off = (turn - f64::from(degrees) / 360.0).rem_euclid(1.0);
                 // A step of 1/65536, cut; and the degrees as single.
-                assert!(off < 1e-6 || off > 1.0 - 1.1 / 65536.0, "{degrees}: {turn}");
+                assert!(!(1e-6..=1.0 - 1.1 / 65536.0).contains(&off), "{degrees}: {turn}");
             }
             let want = height_at(&scene.terrain, tree.x, tree.y);
             assert!((f64::from(s.ground) - want).abs() < 1e-3, "{tree:?}: ground at {} {want}", s.ground);
