@@ -1,4 +1,56 @@
-//! Canopy: forests in real time from a leaf to the horizon.
+//! Canopy: forests in real time from a leaf to the horizon, after Bruneton and Neyret, "Real-time Realistic Rendering
+//! and Lighting of Forests" (Eurographics 2012), here BN12. On explicit Vulkan, headless, with each saving measured.
+//!
+//! # Draw an image
+//!
+//! ```no_run
+//! use std::sync::Arc;
+//! # fn main() -> canopy::Result<()> {
+//! let scene = Arc::new(canopy::scene::load("ridge.toml".as_ref())?);
+//! let gpu = canopy::gpu::Gpu::new(&Default::default())?;
+//! let camera = scene.camera(None)?.clone();
+//! let plan = canopy::plan::Plan::new(&scene, &camera, [1024, 768], false, Some(gpu.info()))?;
+//! let cache = canopy::bake::cache::default_dir();
+//! let mut baked = Vec::new();
+//! for s in &scene.species {
+//!     let settings = (&scene.settings).into();
+//!     let (bake, _) = canopy::bake::load_or_bake(&s.mesh, &s.optics, &settings, cache.as_deref(), false)?;
+//!     baked.push(Arc::new(bake));
+//! }
+//! let mut renderer = canopy::frame::Renderer::new(&gpu, scene.clone(), plan, &baked)?;
+//! renderer.render(&camera, canopy::frame::auto_exposure(&scene))?;
+//! renderer.picture()?.write_png("ridge.png".as_ref())?;
+//! drop(renderer);
+//! gpu.close() // Reports what the validation layers said, and what is still allocated.
+//! # }
+//! ```
+//!
+//! # Where things are
+//!
+//! Data flows one way: [`scene`] → [`plan`] → [`bake`] → [`forest`] → [`frame`] → [`image`]. [`physics`] holds the
+//! models in double precision and knows nobody: it is what the shaders are tested against. [`gpu`] holds all Vulkan and
+//! all `unsafe`, and knows no forest.
+//!
+//! | paper | module | shader | test |
+//! |---|---|---|---|
+//! | BN12 §3, terrain quadtree | [`forest::terrain`], [`forest::quadtree`], [`physics::terrain`] | `forest/terrain_tile.comp`, `physics/terrain.glsl` | `tests/gpu/ground.rs` |
+//! | BN12 §4, seeds from densities | [`forest::seeds`], [`forest::pattern`] | `forest/seeds.comp`, `forest/density.glsl` | `tests/gpu/seeds.rs` |
+//! | BN12 §4, coverage | [`forest::seeds`] | `forest/coverage.*`, `forest/expected_coverage.*` | `tests/gpu/light_on_ground.rs` |
+//! | BN12 §5, views of a z-field | [`bake`], [`physics::views`] | `physics/views.glsl` | `tests/views.rs`, `tests/bake.rs`, `tests/gpu/views.rs` |
+//! | BN12 §5, surface along a ray | [`physics::zfield`] | `physics/zfield.glsl` | `tests/zfield.rs`, `tests/zfield_quality.rs`, `tests/gpu/zfield.rs` |
+//! | BN12 eq. 7–12, light | [`physics::light`] | `physics/light.glsl`, `frame/tree_shade.glsl`, `frame/ground.glsl` | `tests/gpu/light.rs`, `tests/gpu/light_on_ground.rs` |
+//! | BN12 §8, culling in order | [`forest::cull`] | `forest/cull.comp`, `forest/scan.comp`, `forest/compact.comp` | `tests/gpu/cull.rs` |
+//! | BN12 §8, sub-pixel masks | [`physics::masks`] | `physics/masks.glsl` | `tests/gpu/masks.rs` |
+//! | parallel-split shadow maps (Zhang et al. 2006) | [`frame::cascades`], [`frame::shadows`] | `frame/tree_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
+//! | trees that need no file (Weber and Penn 1995) | [`tree`] | | `tests/trees.rs` |
+//! | the scene file | [`scene`] | | `tests/scene_inputs.rs`, `tests/model_inputs.rs` |
+//! | bakes on disk | [`bake::cache`] | | `tests/cache.rs` |
+//! | what a scene requires | [`plan`] | | `tests/gpu/plan.rs` |
+//! | the whole frame: extremes, the same bits again | [`frame`] | `frame/*` | `tests/gpu/extremes.rs`, `tests/gpu/determinism.rs` |
+//! | the program | `src/cli/` | | `tests/cli.rs` |
+//!
+//! Structs and constants that Rust and GLSL share stand once, in `shaders/interface.glsl`; `build.rs` compiles and
+//! reflects every shader and writes their Rust side, [`gpu::interface`]. Every knob stands once, in [`settings`].
 #![warn(missing_docs)]
 
 pub mod bake;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use canopy::bake::{SpeciesBake, cache, load_or_bake};
-use canopy::frame::{FrameReport, Renderer, auto_exposure, check_exposure};
+use canopy::frame::{FrameReport, Renderer, auto_exposure};
 use canopy::gpu::{DeviceInfo, Gpu, GpuOptions, PassTime};
 use canopy::plan::Plan;
 use canopy::progress::Progress;
@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.exr")]
     exr: Option<PathBuf>,
     /// Stops brighter (or, negative, darker) than the automatic exposure
-    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = stops)]
     exposure: f64,
     /// Frames to draw. The first one also fills the caches; times of passes are the last one's
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -138,7 +138,6 @@ struct Report<'a> {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    let exposure = check_exposure(args.exposure)?;
     if let Some(png) = &args.output {
         output::check(png, "png")?;
     }
@@ -156,7 +155,7 @@ pub fn run(args: &Args) -> Result<()> {
     output::check(&png, "png")?;
     let load_s = start.elapsed().as_secs_f64();
     let gpu = Gpu::new(&GpuOptions { device: args.device.clone(), validate: args.validate })?;
-    let drawn = draw(args, exposure, &gpu, scene, &camera, png, load_s);
+    let drawn = draw(args, &gpu, scene, &camera, png, load_s);
     // What the validation layers say comes first: it may be why the drawing failed.
     match (gpu.close(), drawn) {
         (Err(e @ Error::Validation(_)), _) | (Ok(()), Err(e)) | (Err(e), Ok(())) => Err(e),
@@ -165,16 +164,15 @@ pub fn run(args: &Args) -> Result<()> {
     }
 }
 
+fn stops(text: &str) -> std::result::Result<f64, String> {
+    match text.parse() {
+        Ok(ev) if (-64.0..=64.0).contains(&ev) => Ok(ev),
+        _ => Err("write a number of stops from -64 to 64".into()),
+    }
+}
+
 /// Everything between opening and closing the device.
-fn draw(
-    args: &Args,
-    exposure: f64,
-    gpu: &Gpu,
-    scene: Scene,
-    camera: &Camera,
-    png: PathBuf,
-    load_s: f64,
-) -> Result<()> {
+fn draw(args: &Args, gpu: &Gpu, scene: Scene, camera: &Camera, png: PathBuf, load_s: f64) -> Result<()> {
     let quiet = args.print.quiet;
     let plan = Plan::new(&scene, camera, args.scene.size, args.exr.is_some(), Some(gpu.info()))?;
     let scene = Arc::new(scene);
@@ -192,7 +190,7 @@ fn draw(
     let start = Instant::now();
     let mut renderer = Renderer::new(gpu, scene.clone(), plan, &baked)?;
     let build_s = start.elapsed().as_secs_f64();
-    let exposure = auto_exposure(&scene) * exposure;
+    let exposure = auto_exposure(&scene) * args.exposure.exp2();
     let progress = Progress::new("drawing", args.frames.into(), quiet);
     let mut frames_s = Vec::new();
     let mut frame = None;

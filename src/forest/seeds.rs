@@ -58,6 +58,12 @@ pub struct SeedData {
     top: f64,
 }
 
+/// A coverage tile to draw: its quad, its region, and the regions around it with the offset of their quads.
+type TileWork = (u32, u32, Vec<(u32, [f64; 2])>);
+
+/// First and number of the listed trees of a quad.
+type ListedRanges = HashMap<(i32, i32), (u32, u32)>;
+
 /// What a frame has to produce.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SeedWork {
@@ -65,7 +71,7 @@ pub struct SeedWork {
     pub fresh: (u32, u32),
     /// Coverage tiles to draw: the quad's index in [`SeedData::quads`], its region, and the regions around it with the
     /// offset of their quads.
-    tiles: Vec<(u32, u32, Vec<(u32, [f64; 2])>)>,
+    tiles: Vec<TileWork>,
 }
 
 impl SeedData {
@@ -352,7 +358,7 @@ impl SeedData {
 }
 
 /// Listed trees quad by quad, in the order of species and lists, and each quad's first and number.
-fn bin_listed(scene: &Scene, side: f64) -> (Vec<ListedTree>, HashMap<(i32, i32), (u32, u32)>) {
+fn bin_listed(scene: &Scene, side: f64) -> (Vec<ListedTree>, ListedRanges) {
     let mut all: Vec<((i32, i32), ListedTree)> = Vec::new();
     for (species, s) in scene.species.iter().enumerate() {
         let Distribution::Positions(list) = &s.distribution else { continue };

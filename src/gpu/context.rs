@@ -159,11 +159,13 @@ impl Gpu {
         self.shared.collect(u64::MAX);
         let messages = self.messages();
         if !messages.is_empty() {
-            return Err(Error::Validation(format!(
-                "{} validation message(s):\n{}",
-                messages.len(),
-                messages.join("\n")
-            )));
+            let mut text = format!("{} validation message(s):", messages.len());
+            // A message that every pass repeats is shown once.
+            let mut shown = std::collections::HashSet::new();
+            for m in messages.iter().filter(|m| shown.insert(m.as_str())) {
+                text += &format!("\n{}", m.trim_end());
+            }
+            return Err(Error::Validation(text));
         }
         let live = self.memory_report();
         if !live.is_empty() {

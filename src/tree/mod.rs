@@ -1,8 +1,8 @@
 //! Procedural species, written as glTF and read back as glTF.
 //!
 //! The model is that of Weber and Penn, "Creation and Rendering of Realistic Trees" (SIGGRAPH 1995): stems in three
-//! levels, each described by a row of numbers ([`parameters`]), grown into a skeleton ([`skeleton`]), covered with
-//! tapered cylinders and leaf cards ([`surface`]), and dressed in two made textures ([`images`]). A preset and a seed
+//! levels, each described by a row of numbers (`parameters`), grown into a skeleton (`skeleton`), covered with
+//! tapered cylinders and leaf cards (`surface`), and dressed in two made textures (`images`). A preset and a seed
 //! give the same bytes every time.
 
 mod export;

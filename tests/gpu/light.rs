@@ -190,7 +190,7 @@ fn the_display_curve_is_that_of_the_oracle() {
     let mut worst = Worst::default();
     for (c, out) in colors.iter().zip(evaluate(&gpu, Function::ToneCurve, &arguments)) {
         let want = tonemap::tone_curve(c.map(f64::from));
-        for (k, want) in want.iter().enumerate() {
+        for (k, want) in want.into_iter().enumerate() {
             worst.note((float(&out, k) - want).abs(), || format!("{c:?}[{k}]: {} {want}", float(&out, k)));
         }
     }

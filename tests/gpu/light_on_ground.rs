@@ -4,7 +4,6 @@ use crate::device::{self, Worst};
 use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::image::Linear;
-use canopy::physics::terrain::height_and_slope;
 use canopy::scene::{Camera, Distribution, Raster, Scene, Sky, TreePosition};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -82,8 +81,10 @@ fn a_plain_is_as_far_and_as_bright_as_geometry_says() {
             } else if !inside(-1.0) {
                 assert_eq!(l.depth[k], 0.0, "pixel {k} shows the sky");
                 assert_eq!(l.sun[k], [0.0; 3]);
-                for (got, want) in l.sky[k].iter().zip(SKY) {
-                    sky.note((f64::from(*got) / want - 1.0).abs(), || format!("pixel {k}: {:?}", l.sky[k]));
+                for (drawn, given) in l.sky[k].iter().zip(SKY) {
+                    sky.note((f64::from(*drawn) / given - 1.0).abs(), || {
+                        format!("pixel {k}: {:?}", l.sky[k])
+                    });
                 }
             }
         }
@@ -95,82 +96,6 @@ fn a_plain_is_as_far_and_as_bright_as_geometry_says() {
         sun.within(1.0 / 1024.0, &format!("sunlight at {elevation} degrees"));
         sky.within(1.0 / 1024.0, "skylight");
     }
-    gpu.close().unwrap();
-}
-
-#[test]
-fn a_plain_to_the_horizon_is_flat_from_a_metre_above() {
-    let gpu = device::open();
-    for (side, height) in [(4e3, 1.7), (1e5, 1.7), (1e7, 1.7), (1e7, 1e4)] {
-        let mut scene = plain(35.0);
-        scene.terrain.extent = [side; 2];
-        // Not on a vertex of the mesh.
-        let [x, y] = [0.5137 * side, 0.4911 * side];
-        let camera = device::camera([x, y, height], [x + 10.0 * height, y + 7.0 * height, 0.0]);
-        let eye = Eye::new(&camera, &scene.terrain, SIZE);
-        let l = frame(&gpu, &scene, &camera);
-        let mut worst = Worst::default();
-        for k in 0..l.depth.len() {
-            let d = ray(&eye, k);
-            let t = -eye.position[2] / d[2];
-            if t > 0.0 && t < 0.3 * side {
-                worst.note((f64::from(l.depth[k]) / t - 1.0).abs(), || {
-                    format!("pixel {k}: {} {t}", l.depth[k])
-                });
-            }
-        }
-        worst.within(1e-3, &format!("depth of a plain of {side} m from {height} m"));
-    }
-    gpu.close().unwrap();
-}
-
-#[test]
-fn hills_are_as_high_and_as_bright_as_the_oracle_says() {
-    let gpu = device::open();
-    let mut scene = plain(60.0);
-    hills(&mut scene, 8.0);
-    scene.settings.set("shadow_distance", 0.5).unwrap();
-    let raster = scene.terrain.heights.clone().unwrap();
-    let sun = [0.5, 0.0, 60f64.to_radians().sin()];
-    let (mut height, mut light) = (Worst::default(), Worst::default());
-    for (position, target) in [
-        ([150.0, 120.0, 30.0], [200.0, 200.0, 0.0]),
-        ([20.0, 380.0, 10.0], [200.0, 200.0, 0.0]),
-        ([210.0, 190.0, 250.0], [210.0, 190.0, 0.0]),
-    ] {
-        let camera = device::camera(position, target);
-        let eye = Eye::new(&camera, &scene.terrain, SIZE);
-        let l = frame(&gpu, &scene, &camera);
-        let mut ground = 0;
-        for k in (0..l.depth.len()).filter(|k| l.depth[*k] > 0.0) {
-            let (d, t) = (ray(&eye, k), f64::from(l.depth[k]));
-            let hit = [0, 1, 2].map(|i| eye.position[i] + t * d[i]);
-            if !hit[..2].iter().all(|v| (10.0..=390.0).contains(v)) {
-                continue;
-            }
-            ground += 1;
-            // Mesh cells are an eighth of a sample's or, farther away, a 112th of the distance (32 cells a quad, which is
-            // not nearer than 3.5 of its sides), and twice that where they morph. A chord of curvature c is off by
-            // c cell^2 / 8, over two axes; c is at most 8 * 0.1 * (0.35^2 / 100) * 10 = 8 * 0.35^2 / 100, and Catmull-Rom
-            // overshoots that by half.
-            let cell = 2.0 * (10.0 / 8.0f64).max(t / 112.0);
-            let room = 1.5 * 2.0 * (8.0 * 0.35f64.powi(2) / 100.0) * cell * cell / 8.0 + 1e-6 * t;
-            let want = height_and_slope(&raster, hit[0] / 10.0, hit[1] / 10.0);
-            height.note((hit[2] - want[0]).abs() / room, || format!("{hit:?}: {} {room}", want[0]));
-            let n = [-want[1] / 10.0, -want[2] / 10.0, 1.0];
-            let cosine =
-                (0..3).map(|i| n[i] * sun[i]).sum::<f64>() / (n[0] * n[0] + n[1] * n[1] + 1.0).sqrt();
-            let bright = ALBEDO[0] * E[0] * cosine / PI;
-            light.note((f64::from(l.sun[k][0]) / bright - 1.0).abs(), || {
-                format!("{hit:?}: {:?} {bright}", l.sun[k])
-            });
-        }
-        assert!(ground > 1000, "{ground}");
-    }
-    height.within(1.0, "height, in units of its bound");
-    // A slope is sampled twice a mesh cell h and interpolated: off by h2 / 8 times its second derivative, 8 * 0.035^3, and
-    // the overshoot's half more: 1.5e-4 for cells of 3 m. Half floats of slope and light add 2^-11 each.
-    light.within(1.5e-4 + 2.0 / 2048.0, "sunlight");
     gpu.close().unwrap();
 }
 
