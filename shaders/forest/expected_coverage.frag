@@ -1,4 +1,4 @@
-// Coverage to expect from the local density: sum of density times mean area over the species; no disc yet.
+// Coverage to expect from the local density, from the sum of density times mean area over the species; no disc yet.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
@@ -29,5 +29,6 @@ void main() {
         float area = 3.141592653589793 * s.crown_radius * s.crown_radius * (r.x * r.x + r.x * r.y + r.y * r.y) / 3.0;
         sum += area * local_density(s, world, p.extent, g.x, slope);
     }
-    coverage = vec4(0.0, min(sum, 1.0), 0.0, 1.0);
+    // Discs overlap: at random they cover 1 - exp(-Lambda A), not Lambda A.
+    coverage = vec4(0.0, 1.0 - exp(-sum), 0.0, 1.0);
 }

@@ -14,7 +14,7 @@ layout(binding = 6) uniform sampler2DArray coverage;
 layout(std430, binding = 7) readonly buffer Pages { uint items[]; } pages;
 layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
 
-// Coverage by trees here, and the expected coverage for the local density: (Gamma, Lambda A) of BN12 eq. 10.
+// Coverage by trees here, and the expected coverage for the local density: (Gamma, 1 - exp(-Lambda A)), see BN12 eq. 10.
 vec2 ground_coverage() {
     vec2 at = (view.v.quad_offset + position.xy) / view.v.quad_side;
     vec2 quad = floor(at);
@@ -48,7 +48,9 @@ void ground_light(out vec3 sun, out vec3 sky) {
     sun = reflectance * (cosine * visible / PI) * view.v.sun_irradiance;
     // And so do the trees above.
     vec2 cover = ground_coverage() * (1.0 - smoothstep(0.8, 1.0, distance / view.v.range));
-    float open = 0.5 * (1.0 + n.z) * ground_visibility(cover.y) *
+    // Lambda A from 1 - exp(-Lambda A); eight bits tell up to 5.5.
+    float thickness = -log(max(1.0 - cover.y, 1.0 / 256.0));
+    float open = 0.5 * (1.0 + n.z) * ground_visibility(thickness) *
                  ground_contrast(cover.x, cover.y, view.v.ground_contrast);
     sky = reflectance * open * view.v.sky_radiance;
 }

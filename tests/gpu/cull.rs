@@ -1,7 +1,7 @@
 //! The culled set and its order, exactly those of the CPU.
 
 use crate::device;
-use canopy::forest::cull::{CLASS_CAMERA, CLASS_CASCADE, classify, tree_centre};
+use canopy::forest::cull::{CLASS_CAMERA, CLASS_CASCADE, bin_end, classify, tree_centre};
 use canopy::frame::Renderer;
 use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
@@ -108,7 +108,18 @@ fn check(gpu: &Gpu, renderer: &Renderer, view: &View) -> (usize, usize, Vec<usiz
         (0..DISTANCE_BINS as usize - 1).filter(|k| d2 > view.bins[k / 4][k % 4]).count()
     };
     assert!(camera.windows(2).all(|w| bin(w[0]) <= bin(w[1])), "not front to back");
-    let mut commands = vec![(6 * camera.len() as u32, 0)];
+    // Three draws of it: the bins that hold a tree of magnified texels, those of a few pixels, those between.
+    let first_from = |distance: f64| {
+        (1..DISTANCE_BINS).find(|b| bin_end(b - 1, plan.range) >= distance).unwrap_or(DISTANCE_BINS)
+    };
+    let ends = [first_from(plan.draw_limits[0]), first_from(plan.draw_limits[1]), DISTANCE_BINS];
+    let mut commands = Vec::new();
+    let mut first = 0;
+    for end in ends {
+        let count = lists[1..1 + end as usize].iter().map(Vec::len).sum::<usize>() as u32;
+        commands.push((6 * (count - first), 4 * first as i32));
+        first = count;
+    }
     let mut casters = Vec::new();
     for c in 0..MAX_CASCADES {
         let list = &lists[(1 + DISTANCE_BINS + c) as usize];
@@ -121,7 +132,7 @@ fn check(gpu: &Gpu, renderer: &Renderer, view: &View) -> (usize, usize, Vec<usiz
         commands.push((6 * list.len() as u32, 4 * start as i32));
         casters.push(list.len());
     }
-    let found: Vec<DrawCommand> = gpu.read(&cull.commands, 0, 5).unwrap();
+    let found: Vec<DrawCommand> = gpu.read(&cull.commands, 0, commands.len()).unwrap();
     let want: Vec<DrawCommand> = commands
         .into_iter()
         .map(|(index_count, vertex_offset)| DrawCommand {
