@@ -31,14 +31,14 @@ fn main() -> Fallible<()> {
     for path in &sources {
         let name = path.strip_prefix(&root)?.to_string_lossy().replace('\\', "/");
         let text = expand(path, &root, &mut Vec::new())?;
-        let entry = cached(&out, &name, &text, || shader(&compiler, &name, path, &root, &out))?;
+        let entry = cached(&out, &name, &text, |key| shader(&compiler, &name, path, &root, &out, key))?;
         rust.push_str(&entry);
     }
     fs::write(out.join("shaders.rs"), rust)?;
 
     let interface = root.join("interface.glsl");
     let text = fs::read_to_string(&interface)?;
-    let generated = cached(&out, "interface", &text, || structs(&compiler, &text, &root))?;
+    let generated = cached(&out, "interface", &text, |_| structs(&compiler, &text, &root))?;
     fs::write(out.join("interface.rs"), generated)?;
     Ok(())
 }
@@ -74,16 +74,23 @@ fn expand(path: &Path, root: &Path, seen: &mut Vec<PathBuf>) -> Fallible<String>
     Ok(all)
 }
 
-/// `make()`, or what it returned for the same text before.
-fn cached(out: &Path, name: &str, text: &str, make: impl FnOnce() -> Fallible<String>) -> Fallible<String> {
+/// `make(key)`, or what it returned for the same text before; the key names the text, and whatever `make` writes beside
+/// must carry it in its name: a shader changed and changed back would else meet the SPIR-V of the change.
+fn cached(
+    out: &Path,
+    name: &str,
+    text: &str,
+    make: impl FnOnce(&str) -> Fallible<String>,
+) -> Fallible<String> {
     let mut hasher = DefaultHasher::new();
     (text, include_str!("build.rs"), name).hash(&mut hasher);
     let stem = name.replace(['/', '.'], "_");
-    let file = out.join(format!("{stem}.{:016x}.rs", hasher.finish()));
+    let key = format!("{stem}.{:016x}", hasher.finish());
+    let file = out.join(format!("{key}.rs"));
     if let Ok(known) = fs::read_to_string(&file) {
         return Ok(known);
     }
-    let made = make()?;
+    let made = make(&key)?;
     fs::write(&file, &made)?;
     Ok(made)
 }
@@ -114,6 +121,7 @@ fn shader(
     path: &Path,
     root: &Path,
     out: &Path,
+    key: &str,
 ) -> Fallible<String> {
     let text = fs::read_to_string(path)?;
     let (kind, stage) = match path.extension().and_then(|e| e.to_str()) {
@@ -125,7 +133,7 @@ fn shader(
     let run = compiler.compile_into_spirv(&text, kind, &file, "main", Some(&options(root, false)?))?;
     let reflected = compiler.compile_into_spirv(&text, kind, &file, "main", Some(&options(root, true)?))?;
     let stem = name.replace(['/', '.'], "_");
-    fs::write(out.join(format!("{stem}.spv")), run.as_binary_u8())?;
+    fs::write(out.join(format!("{key}.spv")), run.as_binary_u8())?;
 
     let module = ShaderModule::load_u8_data(reflected.as_binary_u8())?;
     let mut bindings = Vec::new();
@@ -156,7 +164,7 @@ fn shader(
     writeln!(rust, "/// `shaders/{name}`.")?;
     writeln!(rust, "pub static {}: Shader = Shader {{", stem.to_uppercase())?;
     writeln!(rust, "    name: {name:?}, stage: vk::ShaderStageFlags::{stage}, push_constant_bytes: {push},")?;
-    writeln!(rust, "    spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{stem}.spv\")),")?;
+    writeln!(rust, "    spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{key}.spv\")),")?;
     writeln!(rust, "    bindings: &[")?;
     for (binding, name, kind) in bindings {
         writeln!(

@@ -23,7 +23,7 @@ layout(binding = 6) uniform sampler2DArray views;
 layout(binding = 7) uniform usampler2DArray shadow_map;
 layout(constant_id = 3) const uint SAMPLES = 4u;
 layout(constant_id = 4) const uint ESTIMATES = 1u;
-layout(constant_id = 7) const uint FILTERED_ESTIMATES = 0u;
+layout(constant_id = 7) const bool MAGNIFIED = false;
 layout(constant_id = 5) const int LIGHT_ITERATIONS = 1;
 layout(constant_id = 6) const bool HAS_SUN = true;
 
@@ -37,7 +37,7 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
     vec3 w = vec3(weights.xy, 1.0 - weights.x - weights.y);
     vec3 layers = vec3(view_c[0].w, view_c[1].w, view_c[2].w);
     bool below = (tree_bits.w >> 4u & 1u) != 0u;
-    Surface at = zfield_search(views, p, d, layers, w, optics.x, ESTIMATES, FILTERED_ESTIMATES, below);
+    Surface at = zfield_search(views, p, d, layers, w, optics.x, MAGNIFIED ? 0u : ESTIMATES, MAGNIFIED ? ESTIMATES : 0u, below);
     // Nothing behind the eye is seen: there s would be 1 or more.
     float s = clamp(at.s, -1e3, 0.999);
     float opacity = at.s < 0.999 ? at.opacity * optics.z : 0.0;
@@ -61,7 +61,12 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
             metres = -dot(lw, vec3(lp[0].z, lp[1].z, lp[2].z)) / dot(lw, vec3(ld[0].z, ld[1].z, ld[2].z));
             vec3 inverse_light = 1.0 / vec3(ld[0].z, ld[1].z, ld[2].z);
             for (int k = 0; k < LIGHT_ITERATIONS; k++) {
-                metres = zfield_fetch(views, lp, ld, inverse_light, light_layers, lw, optics.x, metres, false, k > 0).s;
+                // Unfiltered where a texel is no larger than a pixel.
+                if (MAGNIFIED) {
+                    metres = zfield_fetch(views, lp, ld, inverse_light, light_layers, lw, optics.x, metres, false, k > 0).s;
+                } else {
+                    metres = zfield_estimate(views, lp, ld, inverse_light, light_layers, lw, optics.x, metres, false);
+                }
             }
             metres = max(metres, 0.0);
             lit = exp(-optics.y * metres);

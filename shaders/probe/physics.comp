@@ -50,7 +50,7 @@ void main() {
         case 8u: r.a.x = mask_column(i.a.xyz, i.b.x, i.b.y); break;
         case 9u: {
             uint caster = pack_caster(a.x, a.y);
-            r.a.xy = uvec2(caster, floatBitsToUint(caster_visibility(caster, a.z)));
+            r.a.xy = uvec2(caster, floatBitsToUint(caster_visibility(uvec4(caster), a.z).x));
             break;
         }
         case 10u: r.a.xyz = floatBitsToUint(tone_curve(a.xyz)); break;

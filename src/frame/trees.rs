@@ -13,7 +13,7 @@ use crate::scene::Scene;
 
 /// Draws z-field trees.
 pub struct Trees {
-    /// For the near, middle and far bins: with filtered estimates, with unfiltered ones, without.
+    /// For the near, middle and far bins: texels magnified, estimates filtered; not magnified; without estimates.
     programs: [Program; CAMERA_DRAWS as usize],
 }
 
@@ -26,7 +26,7 @@ impl Trees {
         let s = &scene.settings;
         let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
         let before = s.view_iterations - 1;
-        let program = |estimates: u32, filtered: u32| {
+        let program = |estimates: u32, magnified: bool| {
             gpu.graphics(&GraphicsDesc {
                 vert: &shaders::FRAME_TREE_VERT,
                 frag: if plan.layers { &shaders::FRAME_TREE_LAYERS_FRAG } else { &shaders::FRAME_TREE_FRAG },
@@ -43,11 +43,11 @@ impl Trees {
                     (4, estimates),
                     (5, s.light_iterations),
                     (6, u32::from(plan.cascades > 0)),
-                    (7, filtered),
+                    (7, u32::from(magnified)),
                 ],
             })
         };
-        Ok(Trees { programs: [program(0, before)?, program(before, 0)?, program(0, 0)?] })
+        Ok(Trees { programs: [program(before, true)?, program(before, false)?, program(0, false)?] })
     }
 
     /// Records the pass.

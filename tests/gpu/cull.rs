@@ -6,6 +6,7 @@ use canopy::frame::Renderer;
 use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::{CULL_GROUP, DISTANCE_BINS, DrawCommand, MAX_CASCADES, TREE_LISTS, Tree, View};
+use canopy::plan::Plan;
 use canopy::scene::{Camera, Distribution, Raster, Scene, TreePosition};
 use std::sync::Arc;
 
@@ -24,6 +25,7 @@ fn hills() -> Scene {
         .collect();
     scene.terrain.heights = Some(Raster { width, height, samples });
     scene.terrain.cell_size = 30.0;
+    scene.settings.set("cascades", 4.0).unwrap();
     let place = |k: u32| TreePosition {
         x: f64::from(k % 60) * 15.0,
         y: f64::from(k / 60) * 21.0,
@@ -200,6 +202,84 @@ fn the_sets_of_two_frames_do_not_depend_on_what_came_between() {
     let first = trees(&home);
     trees(&device::camera([100.0, 800.0, 90.0], [300.0, 300.0, 0.0]));
     assert_eq!(trees(&home), first);
+    drop(renderer);
+    gpu.close().unwrap();
+}
+
+#[test]
+fn trees_on_the_very_border_of_the_view_are_in_or_out_as_the_cpu_says() {
+    let gpu = device::open();
+    let mut scene = hills();
+    scene.terrain.heights = None;
+    scene.species.remove(0);
+    let camera = device::camera([451.3, 200.7, 8.0], [480.0, 500.0, 3.0]);
+    let eye = Eye::new(&camera, &scene.terrain, [96, 64]);
+    let mut renderer = device::renderer(&gpu, &scene, &camera, [96, 64], false);
+    let (_, view) = renderer.render_eye(&eye, 1.0).unwrap();
+    let kind = renderer.forest().unwrap().species.rows[0];
+    drop(renderer);
+    // Along the left and right planes at a bounding radius outside, and around the range; off by a few roundings of a
+    // position, so that the order of operations decides.
+    let (radius, z) = (f64::from(kind.bounding_radius), f64::from(kind.centre) - eye.position[2]);
+    let mut list = Vec::new();
+    for k in 0..6000u32 {
+        let off = (f64::from(k % 61) - 30.0) * 2e-6;
+        let along = 20.0 + f64::from(k / 3) * 0.1;
+        let [x, y] = if k % 3 < 2 {
+            let p = view.planes[(k % 3) as usize].map(f64::from);
+            [-(radius + off + p[1] * along + p[2] * z) / p[0], along]
+        } else {
+            let flat = ((f64::from(kind.range) + off).powi(2) - z * z).sqrt();
+            let angle = 0.3 * (f64::from(k) / 6000.0 - 0.5) + 0.095;
+            [flat * angle.sin(), flat * angle.cos()]
+        };
+        list.push(TreePosition {
+            x: eye.position[0] + x,
+            y: eye.position[1] + y,
+            scale: Some(1.0),
+            rotation: None,
+        });
+    }
+    list.retain(|t| [t.x, t.y].iter().all(|v| (0.0..=900.0).contains(v)));
+    let placed = list.len();
+    scene.species[0].distribution = Distribution::Positions(Arc::new(list));
+    let mut renderer = device::renderer(&gpu, &scene, &camera, [96, 64], false);
+    let (_, view) = renderer.render_eye(&eye, 1.0).unwrap();
+    let (_, seen, _) = check(&gpu, &renderer, &view);
+    println!("{seen} of {placed} on the border are seen");
+    assert!(placed > 2000 && seen > placed / 5 && seen < placed * 4 / 5);
+    drop(renderer);
+    gpu.close().unwrap();
+}
+
+#[test]
+fn sums_over_many_workgroups_are_right_to_the_last() {
+    let gpu = device::open();
+    let mut scene = hills();
+    scene.terrain.heights = None;
+    scene.species.remove(1);
+    if let Distribution::Density { max_density, .. } = &mut scene.species[0].distribution {
+        *max_density = 0.2;
+    }
+    scene.settings.set("zfield_min_pixels", 0.25).unwrap();
+    let above = |side: f64| Camera {
+        vertical_fov: 120.0,
+        ..device::camera([0.5 * side, 0.5 * side, 0.6 * side], [0.5 * side, 0.5 * side, 0.0])
+    };
+    // Sixteen whole quads of 4096 points, sixteen workgroups each: one a thread of the prefix sum, and seeds in the last.
+    let plan =
+        |scene: &Scene, side| Plan::new(scene, &above(side), [48, 48], false, Some(gpu.info())).unwrap();
+    let side = 4.0 * plan(&scene, 450.0).quad_side;
+    scene.terrain.extent = [side; 2];
+    let (camera, mut plan) = (above(side), plan(&scene, side));
+    plan.region_capacity = 16 * CULL_GROUP;
+    let baked = device::bake(&scene);
+    let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), plan, &baked).unwrap();
+    let (report, view) = renderer.render_eye(&Eye::new(&camera, &scene.terrain, [48, 48]), 1.0).unwrap();
+    assert_eq!(report.seed_quads, 16);
+    let (records, seen, _) = check(&gpu, &renderer, &view);
+    println!("{records} records, {seen} seen");
+    assert!(seen > 30_000);
     drop(renderer);
     gpu.close().unwrap();
 }

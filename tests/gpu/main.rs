@@ -13,5 +13,6 @@ mod light_on_ground;
 mod masks;
 mod plan;
 mod seeds;
+mod tree;
 mod views;
 mod zfield;
