@@ -26,7 +26,8 @@ float zfield_estimate(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_d
                       float s, bool farthest) {
     float sum_s = 0.0, opacity = 0.0;
     int level = min(int(mip), textureQueryLevels(views) - 1);
-    ivec2 last = textureSize(views, level).xy - 1;
+    // Not textureSize(views, level): llvmpipe takes one invocation's level for all.
+    ivec2 last = max(textureSize(views, 0).xy >> level, 1) - 1;
     for (int i = 0; i < 3; i++) {
         ivec2 at = ivec2(floor((p[i].xy + s * d[i].xy + 0.5) * vec2(last + 1)));
         vec4 t = texelFetch(views, ivec3(clamp(at, ivec2(0), last), int(layers[i])), level);
