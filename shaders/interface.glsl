@@ -26,10 +26,9 @@ struct View {
     vec3 sun_direction;               // unit, towards the sun
     uint cascade_count;               // 0: no sun
     vec3 sun_irradiance;              // on a plane facing the sun, times the exposure scale
-    float near_plane;                 // m
+    float range;                      // distance to which any tree is drawn one by one, m
     vec3 sky_radiance;                // mean over the upper hemisphere, times the exposure scale
     float camera_height;              // z of the camera in the terrain's system, m
-    vec2 size;                        // pixels
     float pixels_at_1m;               // pixels that one metre covers at one metre
     float fade_distance;              // distance over scale over species range at which trees begin to fade
     ivec2 grid_camera;                // camera's cell of the terrain's finest grid
@@ -41,9 +40,6 @@ struct View {
     float hotspot_width;              // a2 of BN12 eq. 8, 1/rad
     float ground_contrast;            // a3 of BN12 eq. 10
     float hole_radius;                // radius of the hole around a tree times sqrt(density), BN12 eq. 9
-    float range;                      // distance to which any tree is drawn one by one, m
-    uint species_count;               // species in the scene
-    uint samples;                     // samples a pixel
 };
 
 // One species.
@@ -54,7 +50,6 @@ struct Species {
     float extinction;                 // of the crown, 1/m
     vec3 transmittance;               // of a leaf
     float range;                      // distance to which a tree of scale 1 is drawn one by one, m
-    float height;                     // of the tree, m
     float crown_radius;               // sqrt(A / pi), m
     float bounding_radius;            // of a sphere about o, m
     uint first_layer;                 // of its views in the z-field array
@@ -68,7 +63,6 @@ struct Species {
     float slope_softness;             // width of the smooth slope limit, as a tangent
     float crown_base;                 // height in scaled tree space under which there is only bark
     vec3 bark;                        // reflectance of bark over albedo of leaves
-    uint pad;                         // unused
 };
 
 // Rows of the projection of scaled tree space into one z-field view.
@@ -99,7 +93,6 @@ struct SeedQuad {
     uint region;                      // its region in the seed buffer
     uint first_position;              // its listed trees
     uint position_count;              // and their number
-    uint pad;                         // unused
 };
 
 // A listed tree, binned to its quad.
@@ -189,11 +182,9 @@ struct TerrainParameters {
 
 // A coverage tile to draw.
 struct CoverageTile {
-    uint layer;                       // of the tile
-    uint region;                      // whose seeds are drawn
-    vec2 offset;                      // corner of that region's quad from the tile's, m
+    vec2 offset;                      // corner of the quad whose seeds are drawn from the tile's, m
     float side;                       // of a quad, m
-    uint quad;                        // of the tile in the list of seed quads
+    uint layer;                       // of the tile
 };
 
 // What tone mapping takes.

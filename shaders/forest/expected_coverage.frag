@@ -16,7 +16,7 @@ layout(location = 0) out vec4 coverage;
 #include "forest/density.glsl"
 
 void main() {
-    SeedQuad q = quads.items[tile.quad];
+    SeedQuad q = quads.items[p.first_quad];
     vec2 within = (gl_FragCoord.xy - 0.5) * (p.quad_side / (SIDE - 1.0));
     vec2 world = vec2(q.texel) * p.cell_size + q.texel_offset * p.cell_size + within;
     vec3 g = vec3(0.0);

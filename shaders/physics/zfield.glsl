@@ -15,9 +15,9 @@ struct Surface {
 // Depth by which a view may disagree with the point found so far before it counts half.
 const float AGREEMENT = 0.15;
 
-// How far an estimate moves the point: all the way to a surface of a quarter's opacity, continuously less for less. A
+// How far an estimate moves the point: all the way to a surface of a twenty-fourth of opacity, continuously less for less. A
 // faint texel must not decide where to look, or silhouettes follow the borders of texels.
-float zfield_move(float s, float estimate, float opacity) { return mix(s, estimate, min(4.0 * opacity, 1.0)); }
+float zfield_move(float s, float estimate, float opacity) { return mix(s, estimate, min(24.0 * opacity, 1.0)); }
 
 // A first estimate of s: one unfiltered texel from each view at p + s d, outside the view its border. Each view's surface
 // is at s_i = (z_i - depth_i(p)) / depth_i(d); their mean is weighted by opacity, which premultiplied texels give without

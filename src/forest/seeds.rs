@@ -12,7 +12,7 @@ use crate::gpu::interface::{
 };
 use crate::gpu::{
     Attachment, Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource,
-    Sampler, Targets, Topology, shaders, vk,
+    Sampler, Targets, shaders, vk,
 };
 use crate::plan::Plan;
 use crate::scene::{Distribution, Scene};
@@ -95,7 +95,6 @@ impl SeedData {
                 samples: 1,
                 depth: DepthTest::None,
                 blend,
-                topology: Topology::Triangles,
                 constants,
             })
         };
@@ -288,7 +287,6 @@ impl SeedData {
             region,
             first_position: first,
             position_count: count,
-            pad: 0,
         }
     }
 
@@ -339,16 +337,16 @@ impl SeedData {
             ];
             pass.bind(&self.programs.1, &bound);
             for (quad, layer, _) in &work.tiles {
-                let tile =
-                    CoverageTile { layer: *layer, region: *layer, offset: [0.0; 2], side, quad: *quad };
-                pass.push(&ExpectedCoverage { parameters: self.parameters, tile });
+                let tile = CoverageTile { offset: [0.0; 2], side, layer: *layer };
+                let parameters = SeedParameters { first_quad: *quad, ..self.parameters };
+                pass.push(&ExpectedCoverage { parameters, tile });
                 pass.draw(3, 1);
             }
             pass.bind(&self.programs.2, &bound);
-            for (quad, layer, around) in &work.tiles {
+            for (_, layer, around) in &work.tiles {
                 for (region, offset) in around {
                     let offset = offset.map(|v| v as f32);
-                    pass.push(&CoverageTile { layer: *layer, region: *region, offset, side, quad: *quad });
+                    pass.push(&CoverageTile { offset, side, layer: *layer });
                     let command = u64::from(*region) * size_of::<DrawCommand>() as u64;
                     pass.draw_indexed_indirect(&self.quad_indices, &self.draws, command);
                 }

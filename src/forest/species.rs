@@ -163,7 +163,6 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Arc<SpeciesBake>], view_count: u32)
             extinction: bake.extinction,
             transmittance: bake.transmittance,
             range: plan.species_range[k] as f32,
-            height: bake.height,
             crown_radius: bake.crown_radius,
             bounding_radius: bake.radius.hypot(bake.half_height),
             first_layer: k as u32 * view_count,
@@ -178,7 +177,7 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Arc<SpeciesBake>], view_count: u32)
             crown_base: (bake.crown_base - bake.center) / bake.half_height,
             // Black leaves have no colour to compare with.
             bark: std::array::from_fn(|i| bake.bark[i] / bake.albedo()[i].max(1e-3)),
-            pad: 0,
+            ..bytemuck::Zeroable::zeroed()
         });
     }
     rows

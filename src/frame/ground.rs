@@ -8,7 +8,7 @@ use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::gpu::interface::{GRID_SIDE, NO_PAGE, TERRAIN_CELLS, TERRAIN_HEIGHTS};
 use crate::gpu::{
     Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler,
-    Targets, Topology, shaders, vk,
+    Targets, shaders, vk,
 };
 use crate::plan::Plan;
 
@@ -48,7 +48,6 @@ impl Ground {
                 samples: plan.samples,
                 depth: DepthTest::Reverse,
                 blend: Blend::Replace,
-                topology: Topology::Triangles,
                 constants: &[],
             })?,
             no_coverage: gpu.image(&ImageDesc {

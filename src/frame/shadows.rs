@@ -10,7 +10,7 @@ use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand, TERRAIN_CELLS, TerrainParameters};
 use crate::gpu::{
     Attachment, Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource,
-    Sampler, Targets, Topology, shaders, vk,
+    Sampler, Targets, shaders, vk,
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -53,7 +53,6 @@ impl Shadows {
                 samples: 1,
                 depth: DepthTest::Reverse,
                 blend: Blend::Replace,
-                topology: Topology::Triangles,
                 constants,
             })
         };

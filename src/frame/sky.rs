@@ -5,7 +5,7 @@ use super::view::Light;
 use crate::Result;
 use crate::gpu::{
     Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler,
-    Targets, Topology, shaders, vk,
+    Targets, shaders, vk,
 };
 use crate::plan::Plan;
 use crate::scene::{Scene, Sky};
@@ -48,7 +48,6 @@ impl SkyPass {
             samples: plan.samples,
             depth: DepthTest::None,
             blend: Blend::Replace,
-            topology: Topology::Triangles,
             constants: &[],
         })?;
         Ok(Some(SkyPass { image, program }))

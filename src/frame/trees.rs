@@ -6,7 +6,7 @@ use crate::Result;
 use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand};
 use crate::gpu::{
     Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets,
-    Topology, shaders,
+    shaders,
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -34,7 +34,6 @@ impl Trees {
                 samples: plan.samples,
                 depth: DepthTest::Reverse,
                 blend: Blend::Replace,
-                topology: Topology::Triangles,
                 constants: &[
                     (0, s.view_rings),
                     (1, (s.view_resolution as f32).to_bits()),

@@ -1,6 +1,6 @@
 //! The view buffer: everything of a frame that does not depend on the object drawn.
 
-use super::camera::{Eye, NEAR_PLANE};
+use super::camera::Eye;
 use super::cascades::Cascade;
 use crate::forest::cull::bin_end;
 use crate::forest::seeds::SeedData;
@@ -115,9 +115,7 @@ pub fn view(
     view.cascade_count = cascades.len() as u32;
     view.sun_irradiance = scaled(light.sun);
     view.sky_radiance = scaled(light.sky);
-    view.near_plane = NEAR_PLANE as f32;
     view.camera_height = eye.position[2] as f32;
-    view.size = eye.size.map(|v| v as f32);
     view.pixels_at_1m = eye.pixels_at_1m as f32;
     view.fade_distance = 0.8;
     view.hotspot_amplitude = s.hotspot_amplitude;
@@ -125,7 +123,5 @@ pub fn view(
     view.ground_contrast = s.ground_contrast;
     view.hole_radius = s.hole_radius;
     view.range = plan.range.max(1.0) as f32;
-    view.species_count = scene.species.len() as u32;
-    view.samples = plan.samples;
     view
 }

@@ -81,14 +81,7 @@ pub enum Blend {
     Union,
 }
 
-/// What the vertices make.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Topology {
-    /// Separate triangles.
-    Triangles,
-}
-
-/// A graphics pipeline.
+/// A graphics pipeline; it draws triangles.
 #[derive(Clone, Copy, Debug)]
 pub struct GraphicsDesc<'a> {
     /// Vertex shader.
@@ -103,8 +96,6 @@ pub struct GraphicsDesc<'a> {
     pub depth: DepthTest,
     /// Blending, for every colour attachment.
     pub blend: Blend,
-    /// Primitives.
-    pub topology: Topology,
     /// Specialization constants: (id, value).
     pub constants: &'a [(u32, u32)],
 }
@@ -150,7 +141,6 @@ impl Gpu {
                 .specialization_info(&special)
         });
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
-        let Topology::Triangles = d.topology;
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
             .topology(vk::PrimitiveTopology::TRIANGLE_LIST);
         let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);

@@ -152,8 +152,8 @@ fn nearest(field: &ZField, level: usize, layer: u32, u: f64, v: f64) -> Texel {
 /// iterations over the three views of `lookup`.
 ///
 /// All but the last only move the point. They read one mip coarser, so that a small hole before p₀ does not end the
-/// search, unfiltered unless texels are magnified (level 0), and move by as much as four times the opacity that they
-/// find, at most all the way: a faint texel must not decide where to look, or silhouettes follow the borders of texels.
+/// search, unfiltered unless texels are magnified (level 0), and move by as much as 24 times the opacity that
+/// they find, at most all the way: a faint texel must not decide where to look, or silhouettes follow the borders of texels.
 /// Opacity, occlusion and depth are of the last iteration, from the same texels. From below, the views are looked at from
 /// behind: the surface nearest to that viewer is the farthest one along wᵢ; its occlusion is that of the other side, the
 /// only one stored.
@@ -163,7 +163,7 @@ pub fn intersect(field: &ZField, level: usize, lookup: &Lookup, ray: &Ray, itera
         let (texel, refine): (fn(&_, _, _, _, _) -> _, _) =
             if level == 0 { (sample, iteration > 1) } else { (nearest, false) };
         let found = look(field, level + 1, lookup, ray, s, texel, (lookup.below, refine));
-        s += (found.s - s) * (4.0 * found.alpha).min(1.0);
+        s += (found.s - s) * (24.0 * found.alpha).min(1.0);
     }
     let found = look(field, level, lookup, ray, s, sample, (lookup.below, iterations > 1));
     Entry { s: found.s, point: ray.origin + found.s * ray.to, alpha: found.alpha, occlusion: found.occlusion }

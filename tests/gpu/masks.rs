@@ -2,8 +2,7 @@
 
 use crate::device::{self, Arguments, Function, evaluate};
 use canopy::gpu::{
-    Attachment, Blend, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Resource, Targets, Topology, shaders,
-    vk,
+    Attachment, Blend, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Resource, Targets, shaders, vk,
 };
 use canopy::physics::masks;
 
@@ -103,7 +102,6 @@ fn n_trees_of_opacity_alpha_cover_one_minus_one_minus_alpha_to_the_n() {
                 samples,
                 depth: DepthTest::None,
                 blend: Blend::Replace,
-                topology: Topology::Triangles,
                 constants: &[(2, table.len() as u32), (3, samples)],
             })
             .unwrap();

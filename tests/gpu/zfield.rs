@@ -89,7 +89,7 @@ fn steps(
     for n in 0..iterations - 1 {
         let kind = if level == 0 { Kind::Filtered(n) } else { Kind::Estimate };
         let at = step(field, level + 1, &lookup, ray, start, kind, noise);
-        start += (at[0] - start) * (4.0 * at[1]).min(1.0);
+        start += (at[0] - start) * (24.0 * at[1]).min(1.0);
     }
     step(field, level, &lookup, ray, start, Kind::Last(iterations > 1), noise)
 }
