@@ -234,21 +234,12 @@ fn structs(compiler: &shaderc::Compiler, text: &str, root: &Path) -> Fallible<St
     for (k, (name, doc)) in names.iter().enumerate() {
         let block = blocks.iter().find(|b| b.binding == k as u32).ok_or("a struct got lost")?;
         let items = block.block.members.first().ok_or("a struct is empty")?;
-        let described = items.type_description.as_ref().map_or(0, |t| t.traits.array.stride);
-        let stride = described.max(items.array.stride).max(items.padded_size);
-        emit(&mut rust, name, doc, items, stride, text)?;
+        emit(&mut rust, name, doc, items, text)?;
     }
     Ok(rust)
 }
 
-fn emit(
-    rust: &mut String,
-    name: &str,
-    doc: &str,
-    block: &ReflectBlockVariable,
-    size: u32,
-    text: &str,
-) -> Fallible<()> {
+fn emit(rust: &mut String, name: &str, doc: &str, block: &ReflectBlockVariable, text: &str) -> Fallible<()> {
     writeln!(
         rust,
         "/// {doc}\n#[repr(C)]\n#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]"
@@ -294,9 +285,21 @@ fn emit(
         )?;
         at = m.offset + bytes;
     }
+    // The stride of an array of these (std430): the end of the last member, rounded up to the widest alignment.
+    // Reflection gives no stride for arrays without length.
+    let size = at.next_multiple_of(block.members.iter().map(alignment).max().unwrap_or(4));
     pad(rust, at, size, &mut pads)?;
     writeln!(rust, "}}\nconst _: () = assert!(size_of::<{name}>() == {size});\n{checks}")?;
     Ok(())
+}
+
+/// Base alignment of a member in std430: of its vector, whose three components align like four.
+fn alignment(member: &ReflectBlockVariable) -> u32 {
+    match (member.numeric.matrix.column_count, member.numeric.vector.component_count) {
+        (0, 0 | 1) => 4,
+        (0, 2) => 8,
+        _ => 16,
+    }
 }
 
 /// The comment behind a member in interface.glsl.

@@ -287,6 +287,7 @@ impl SeedData {
             region,
             first_position: first,
             position_count: count,
+            ..bytemuck::Zeroable::zeroed()
         }
     }
 
