@@ -184,7 +184,7 @@ pub fn light_ray(field: &ZField, level: usize, p: DVec3, l: DVec3, iterations: u
     let mut found = Look { s: -p.dot(mean) / l.dot(mean), ..Look::default() };
     for iteration in 0..iterations {
         let from = found.s;
-        found = look(field, level, &lookup, &ray, from, sample, (false, iteration > 0));
+        found = look(field, level, &lookup, &ray, from, sample, (lookup.below, iteration > 0));
     }
     Entry { s: found.s, point: p + found.s * l, alpha: found.alpha, occlusion: found.occlusion }
 }
