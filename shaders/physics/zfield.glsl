@@ -13,7 +13,7 @@ struct Surface {
 };
 
 // Depth by which a view may disagree with the point found so far before it counts half.
-const float AGREEMENT = 0.15;
+const float AGREEMENT = 0.2;
 
 // How far an estimate moves the point: all the way to a surface of a twenty-fourth of opacity, continuously less for less. A
 // faint texel must not decide where to look, or silhouettes follow the borders of texels.

@@ -84,7 +84,7 @@ pub struct Entry {
 }
 
 /// Depth, in scaled tree space, by which a view may disagree with the point found so far before it counts half.
-pub const AGREEMENT: f64 = 0.15;
+pub const AGREEMENT: f64 = 0.2;
 
 /// What one look into the three views gives.
 #[derive(Clone, Copy, Debug, Default)]
