@@ -7,6 +7,7 @@
 #include "physics/views.glsl"
 #include "physics/light.glsl"
 #include "forest/cull.glsl"
+#include "forest/members.glsl"
 
 layout(local_size_x = 256) in;
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
@@ -22,8 +23,6 @@ layout(std430, binding = 9) readonly buffer Totals { uint items[]; } totals;
 layout(push_constant) uniform Push { CullParameters p; };
 layout(constant_id = 0) const int RINGS = 9;
 layout(constant_id = 1) const float RESOLUTION = 256.0;
-
-shared uint members[TREE_LISTS * 8];
 
 uint rank_in(uint list, uint thread) {
     uint rank = 0u, word = thread >> 5u;
@@ -83,17 +82,9 @@ Tree make_tree(Seed s, vec3 centre, Species kind) {
 
 void main() {
     uint thread = gl_LocalInvocationIndex, group = gl_WorkGroupID.x;
-    for (uint k = thread; k < TREE_LISTS * 8u; k += CULL_GROUP) members[k] = 0u;
-    barrier();
+    clear_members(thread);
     uint seen = classes.items[group * CULL_GROUP + thread];
-    uint word = thread >> 5u, bit = 1u << (thread & 31u);
-    if (seen != 0u) {
-        atomicOr(members[word], bit);
-        if ((seen & CLASS_CAMERA) != 0u) atomicOr(members[(1u + (seen & 31u)) * 8u + word], bit);
-        for (uint c = 0u; c < MAX_CASCADES; c++) {
-            if ((seen >> (8u + c) & 1u) != 0u) atomicOr(members[(1u + DISTANCE_BINS + c) * 8u + word], bit);
-        }
-    }
+    enlist(seen, thread);
     barrier();
     if (seen == 0u || totals.items[0] > p.tree_capacity) return;
     SeedQuad q = quads.items[group / p.groups_per_region];

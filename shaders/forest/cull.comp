@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
 #include "forest/cull.glsl"
+#include "forest/members.glsl"
 
 layout(local_size_x = 256) in;
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
@@ -15,12 +16,9 @@ layout(std430, binding = 5) writeonly buffer Classes { uint items[]; } classes;
 layout(std430, binding = 6) writeonly buffer Counts { uint items[]; } counts;
 layout(push_constant) uniform Push { CullParameters p; };
 
-shared uint members[TREE_LISTS * 8];
-
 void main() {
     uint thread = gl_LocalInvocationIndex;
-    for (uint k = thread; k < TREE_LISTS * 8u; k += CULL_GROUP) members[k] = 0u;
-    barrier();
+    clear_members(thread);
     SeedQuad q = quads.items[gl_WorkGroupID.x / p.groups_per_region];
     uint slot = (gl_WorkGroupID.x % p.groups_per_region) * CULL_GROUP + thread;
     uint seen = 0u;
@@ -29,14 +27,7 @@ void main() {
         seen = classify(view.v, species.items[s.species], tree_centre(view.v, q, s, species.items[s.species]), s.scale);
     }
     classes.items[gl_WorkGroupID.x * CULL_GROUP + thread] = seen;
-    uint word = thread >> 5u, bit = 1u << (thread & 31u);
-    if (seen != 0u) {
-        atomicOr(members[word], bit);
-        if ((seen & CLASS_CAMERA) != 0u) atomicOr(members[(1u + (seen & 31u)) * 8u + word], bit);
-        for (uint c = 0u; c < MAX_CASCADES; c++) {
-            if ((seen >> (8u + c) & 1u) != 0u) atomicOr(members[(1u + DISTANCE_BINS + c) * 8u + word], bit);
-        }
-    }
+    enlist(seen, thread);
     barrier();
     if (thread < TREE_LISTS) {
         uint count = 0u;

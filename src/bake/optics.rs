@@ -19,6 +19,7 @@ use glam::{Vec2, Vec3};
 
 use super::surface::Surface;
 use super::{SpeciesBake, ZField};
+use crate::physics::tonemap::linear as linear_from_srgb;
 use crate::physics::views::{self, Basis};
 use crate::scene::{Material, Mesh, OpticsOverride, Texture};
 
@@ -72,7 +73,7 @@ fn measure(
     let mut heights: Vec<(f32, f64)> = Vec::new();
     let mut linear = [0f64; 256];
     for (i, x) in linear.iter_mut().enumerate() {
-        *x = srgb_to_linear(i as f64 / 255.0);
+        *x = linear_from_srgb(i as f64 / 255.0);
     }
     for face in surface.faces.iter().filter(|f| keep(&mesh.materials[f.material as usize])) {
         let material = &mesh.materials[face.material as usize];
@@ -116,10 +117,6 @@ fn nearest(texture: &Texture, uv: Vec2) -> [u8; 3] {
     let wrap = |x: f32, n: u32| ((x - x.floor()) * n as f32) as u32 % n;
     let at = 4 * (wrap(uv.y, texture.height) * texture.width + wrap(uv.x, texture.width)) as usize;
     [texture.rgba[at], texture.rgba[at + 1], texture.rgba[at + 2]]
-}
-
-fn srgb_to_linear(x: f64) -> f64 {
-    if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }
 
 /// Mean over the hemisphere of the volume between nearest and farthest surfaces, in units of det S.

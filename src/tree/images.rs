@@ -6,15 +6,14 @@ use image::{Rgba, RgbaImage};
 
 use super::Preset;
 use super::random::Random;
+use crate::physics::tonemap;
 
 const SIZE: u32 = 256;
 /// Sub-samples a side of a texel, for soft edges.
 const FINE: u32 = 3;
 
 fn srgb(linear: f64) -> u8 {
-    let l = linear.clamp(0.0, 1.0);
-    let encoded = if l <= 0.003_130_8 { 12.92 * l } else { 1.055 * l.powf(1.0 / 2.4) - 0.055 };
-    (255.0 * encoded).round() as u8
+    (255.0 * tonemap::srgb(linear.clamp(0.0, 1.0))).round() as u8
 }
 
 fn encode(color: [f64; 3], alpha: f64) -> Rgba<u8> {
@@ -237,8 +236,7 @@ mod tests {
     use super::*;
 
     fn linear(c: u8) -> f64 {
-        let c = f64::from(c) / 255.0;
-        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+        tonemap::linear(f64::from(c) / 255.0)
     }
 
     #[test]
