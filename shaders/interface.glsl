@@ -4,7 +4,7 @@ const uint MAX_SPECIES = 8u;          // most species in a scene
 const uint MAX_CASCADES = 4u;         // most shadow cascades
 const uint DISTANCE_BINS = 32u;       // bins of the camera's list of trees, front to back
 const uint TREE_LISTS = 37u;          // lists that a seed can be in: all, one of the bins, each cascade
-const uint CAMERA_DRAWS = 3u;          // draws of the camera's list: near, middle and far bins
+const uint CAMERA_DRAWS = 4u;          // draws of the camera's list: near, middle, far and converged bins
 const uint CULL_GROUP = 256u;         // seeds a workgroup of the cull
 const uint TERRAIN_CELLS = 32u;       // mesh cells along a side of a terrain quad
 const uint TERRAIN_HEIGHTS = 33u;     // height samples along a side of a terrain tile
@@ -30,7 +30,6 @@ struct View {
     vec3 sky_radiance;                // mean over the upper hemisphere, times the exposure scale
     float camera_height;              // z of the camera in the terrain's system, m
     float pixels_at_1m;               // pixels that one metre covers at one metre
-    float fade_distance;              // distance over scale over species range at which trees begin to fade
     ivec2 grid_camera;                // camera's cell of the terrain's finest grid
     vec2 grid_offset;                 // camera's position in that cell, m
     ivec2 quad_camera;                // camera's seed quad
@@ -49,7 +48,7 @@ struct Species {
     vec3 reflectance;                 // of a leaf
     float extinction;                 // of the crown, 1/m
     vec3 transmittance;               // of a leaf
-    float range;                      // distance to which a tree of scale 1 is drawn one by one, m
+    float range;                      // s_max: distance to which trees are drawn one by one, m
     float crown_radius;               // sqrt(A / pi), m
     float bounding_radius;            // of a sphere about o, m
     uint first_layer;                 // of its views in the z-field array
@@ -63,6 +62,9 @@ struct Species {
     float slope_softness;             // width of the smooth slope limit, as a tangent
     float crown_base;                 // height in scaled tree space under which there is only bark
     vec3 bark;                        // reflectance of bark over albedo of leaves
+    float area;                       // A: mean horizontal area of a tree, m2
+    float vertical_scale;             // of the space in which its tables are, BN12 eq. 2-6
+    float max_thickness;              // density times area at the tables' last density
 };
 
 // Rows of the projection of scaled tree space into one z-field view.
@@ -80,8 +82,8 @@ struct Seed {
     float scale;                      // of the model
     uint turn_tint;                   // low half: rotation in 1/65536 turn; high half: tint
     uint identity;                    // hash from which the tree's other random numbers come
-    uint ground_light;                // two halves: n.u_z of the ground; square root of the local density
-    uint species;                     // index
+    uint slope;                       // two halves: derivatives of the ground's height east and north
+    uint species_density;             // low half: index; high half: square root of the density of all trees, half float
 };
 
 // A seed quad with a region of seeds.
@@ -141,6 +143,10 @@ struct Tree {
     float hole;                       // 1 / squared radius of the hole around it, 1/m2
     vec3 sky;                         // radiance of a leaf under the whole sky
     uint cascade;                     // for its shadow lookups
+    vec3 mean_sun;                    // average radiance from the sun, times nu of BN12 eq. 22
+    float own;                        // 1 - nu: weight of the tree's own light
+    vec3 mean_sky;                    // average radiance from the sky, times nu
+    float mean_lit;                   // average k_t / (k_t + k_t-bar), times nu
 };
 
 // An indexed indirect draw.
@@ -159,7 +165,8 @@ struct CullParameters {
     uint region_capacity;             // seeds a region
     uint tree_capacity;               // trees that fit
     uint near_bins;                   // distance bins of the camera's first draw
-    uint far_bins;                    // first distance bin of its last
+    uint far_bins;                    // first distance bin of its third
+    uint converged_bins;              // first distance bin of its last
 };
 
 // One terrain quad to draw.

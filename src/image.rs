@@ -36,8 +36,11 @@ pub struct Linear {
     pub depth: Vec<f32>,
     /// Fraction of the pixel's samples that show trees.
     pub coverage: Vec<f32>,
-    /// Species at the pixel's first sample, counted from 1; 0 where no tree is.
+    /// Species at the pixel's first sample, counted from 1; 0 where no tree is drawn by itself.
     pub species: Vec<u32>,
+    /// The four fractions k of BN12: lit ground, shadowed ground, lit trees, shadowed trees; their sum is the share of
+    /// the pixel that is not background.
+    pub fractions: Vec<[f32; 4]>,
 }
 
 impl Picture {
@@ -62,6 +65,7 @@ impl Picture {
                 depth: depth.iter().map(|z| if *z > 0.0 { NEAR_PLANE as f32 / z } else { 0.0 }).collect(),
                 coverage: sky.iter().map(|t| f16::from_bits(t[3]).to_f32()).collect(),
                 species: gpu.read_image(&targets.colors[2].image, 0, 0)?,
+                fractions: part(3)?.iter().map(|t| t.map(|v| f16::from_bits(v).to_f32())).collect(),
             })
         });
         Ok(Picture { size: plan.size, display, linear: linear.transpose()? })
@@ -86,8 +90,8 @@ impl Picture {
         write_whole(path, &bytes)
     }
 
-    /// Writes the linear image as EXR: layers `radiance`, `sun`, `sky` (R, G, B), `depth` (Z), `trees` (coverage) and
-    /// `species` (id).
+    /// Writes the linear image as EXR: layers `radiance`, `sun`, `sky` (R, G, B), `depth` (Z), `trees` (coverage),
+    /// `species` (id) and `fractions` (lit_ground, shadowed_ground, lit_tree, shadowed_tree).
     ///
     /// # Errors
     /// [`Error::Usage`] if the plan had no layers; [`Error::Io`].
@@ -119,6 +123,14 @@ impl Picture {
             layer("depth", vec![("Z", FlatSamples::F32(l.depth.clone()))]),
             layer("trees", vec![("coverage", FlatSamples::F32(l.coverage.clone()))]),
             layer("species", vec![("id", FlatSamples::U32(l.species.clone()))]),
+            layer(
+                "fractions",
+                ["lit_ground", "shadowed_ground", "lit_tree", "shadowed_tree"]
+                    .iter()
+                    .enumerate()
+                    .map(|(k, name)| (*name, FlatSamples::F32(l.fractions.iter().map(|f| f[k]).collect())))
+                    .collect(),
+            ),
         ];
         let attributes =
             exr::prelude::ImageAttributes::new(exr::prelude::IntegerBounds::from_dimensions(size));

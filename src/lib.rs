@@ -11,12 +11,8 @@
 //! let camera = scene.camera(None)?.clone();
 //! let plan = canopy::plan::Plan::new(&scene, &camera, [1024, 768], false, Some(gpu.info()))?;
 //! let cache = canopy::bake::cache::default_dir();
-//! let mut baked = Vec::new();
-//! for s in &scene.species {
-//!     let settings = (&scene.settings).into();
-//!     let (bake, _) = canopy::bake::load_or_bake(&s.mesh, &s.optics, &settings, cache.as_deref(), false)?;
-//!     baked.push(Arc::new(bake));
-//! }
+//! let baked = canopy::bake::load_or_bake_scene(&scene, cache.as_deref(), false)?;
+//! let baked: Vec<_> = baked.into_iter().map(|(species, _)| species).collect();
 //! let mut renderer = canopy::frame::Renderer::new(&gpu, scene.clone(), plan, &baked)?;
 //! renderer.render(&camera, canopy::frame::auto_exposure(&scene))?;
 //! renderer.picture()?.write_png("ridge.png".as_ref())?;
@@ -59,6 +55,7 @@ pub mod forest;
 pub mod frame;
 pub mod gpu;
 pub mod image;
+pub mod measure;
 pub mod physics;
 pub mod plan;
 pub mod progress;

@@ -6,6 +6,7 @@ use crate::forest::seeds::fullest_listed;
 use crate::frame::camera::Eye;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
+use crate::physics::handover::CONVERGED;
 use crate::physics::light::sun_disc_fraction;
 use crate::physics::views;
 use crate::scene::{Albedo, Camera, Distribution, Scene, Sky};
@@ -17,6 +18,44 @@ const PATTERN_POINTS: u32 = 256;
 const QUADS_IN_RANGE: f64 = 24.0;
 /// Storage buffers that every Vulkan device binds, when no device is known.
 const ASSUMED_STORAGE: u64 = 128 << 20;
+
+/// How trees are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Representation {
+    /// z-fields near, the shader-map far, blended between (BN12, section 7).
+    #[default]
+    Auto,
+    /// z-fields at any distance.
+    #[serde(rename = "zfield")]
+    ZField,
+    /// The shader-map at any distance.
+    ShaderMap,
+}
+
+impl Representation {
+    /// All, with the names that users write.
+    pub const NAMES: [(&'static str, Representation); 3] = [
+        ("auto", Representation::Auto),
+        ("zfield", Representation::ZField),
+        ("shader-map", Representation::ShaderMap),
+    ];
+
+    /// The name that users write.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(_, r)| *r == self).map_or("", |(n, _)| n)
+    }
+
+    /// Distance to which a species is drawn tree by tree, m, from that of [`Representation::Auto`].
+    fn range(self, auto: f64) -> f64 {
+        match self {
+            Representation::Auto => auto,
+            // Finite, so that its square is so in single precision.
+            Representation::ZField => 1e15,
+            Representation::ShaderMap => 1e-3,
+        }
+    }
+}
 
 /// One thing that the scene requires.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -36,6 +75,8 @@ pub struct Item {
 pub struct Plan {
     /// Everything, in the order of building.
     pub items: Vec<Item>,
+    /// How trees are drawn.
+    pub representation: Representation,
     /// Image size, pixels.
     pub size: [u32; 2],
     /// Samples a pixel.
@@ -46,13 +87,14 @@ pub struct Plan {
     pub cascades: u32,
     /// Distance that the cascades reach, m.
     pub shadow_distance: f64,
-    /// Distance to which each species is drawn tree by tree, for scale 1, m.
+    /// Distance to which each species is drawn tree by tree (s_max of BN12), m.
     pub species_range: Vec<f64>,
-    /// The largest of these for any tree, m; 0 without trees.
+    /// The largest of these, m; 0 without trees.
     pub range: f64,
-    /// Distances under which texels of some tree are magnified, and from which every tree covers only a few pixels, m:
-    /// the search for its surface needs filtered estimates, or none.
-    pub draw_limits: [f64; 2],
+    /// Distances under which texels of some tree are magnified, from which every tree covers only a few pixels, and from
+    /// which its light has converged to the average, m, ascending: the search for its surface needs filtered estimates, or
+    /// none, and then no light ray or shadow either.
+    pub draw_limits: [f64; 3],
     /// Height of the tallest tree, m.
     pub tallest: f64,
     /// Side of a seed quad, m.
@@ -90,20 +132,34 @@ impl Plan {
         layers: bool,
         device: Option<&DeviceInfo>,
     ) -> Result<Self> {
+        Self::for_eye(scene, &Eye::new(camera, &scene.terrain, size), layers, Representation::Auto, device)
+    }
+
+    /// Plans an image of a scene as an eye sees it.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn for_eye(
+        scene: &Scene,
+        eye: &Eye,
+        layers: bool,
+        representation: Representation,
+        device: Option<&DeviceInfo>,
+    ) -> Result<Self> {
         let s = &scene.settings;
-        let eye = Eye::new(camera, &scene.terrain, size);
         let has_sun =
             sun_disc_fraction(scene.sun.elevation) > 0.0 && scene.sun.irradiance.iter().any(|e| *e > 0.0);
         let mut plan = Plan {
             items: Vec::new(),
-            size,
+            representation,
+            size: eye.size,
             samples: samples(s.samples, device),
             layers,
             cascades: if has_sun { s.cascades } else { 0 },
             shadow_distance: 0.0,
             species_range: Vec::new(),
             range: 0.0,
-            draw_limits: [0.0; 2],
+            draw_limits: [0.0; 3],
             tallest: 0.0,
             quad_side: 1.0,
             tile_side: 1.0,
@@ -123,10 +179,11 @@ impl Plan {
                 gpu::MAX_SPECIES
             )));
         }
-        plan.trees(scene, &eye, device);
+        plan.trees(scene, eye, device);
         let diagonal = scene.terrain.extent[0].hypot(scene.terrain.extent[1]);
         plan.shadow_distance = match f64::from(s.shadow_distance) {
-            0.0 if plan.range > 0.0 => plan.range.min(diagonal + eye.position[2].abs()),
+            // Farther out the average light includes its shadows.
+            0.0 if plan.range > 0.0 => (CONVERGED * plan.range).min(diagonal + eye.position[2].abs()),
             0.0 => diagonal,
             chosen => chosen,
         };
@@ -146,7 +203,8 @@ impl Plan {
         let mut area_density = 0.0;
         for species in &scene.species {
             let height = species.mesh.positions.iter().map(|p| p[2]).fold(0.0, f32::max).max(1e-3);
-            let range = f64::from(height) * eye.pixels_at_1m / f64::from(s.zfield_min_pixels);
+            let apparent = f64::from(height) * eye.pixels_at_1m / f64::from(s.zfield_min_pixels);
+            let range = self.representation.range(apparent);
             self.species_range.push(range);
             let mut scale = f64::from(species.scale[1]);
             match &species.distribution {
@@ -160,23 +218,27 @@ impl Plan {
                     area_density += list.len() as f64 / (scene.terrain.extent[0] * scene.terrain.extent[1]);
                 }
             }
-            self.range = self.range.max(range * scale);
+            self.range = self.range.max(range);
             let reach = species.mesh.positions.iter().map(|p| p[0].hypot(p[1]).max(p[2])).fold(0.0, f32::max);
             self.tallest = self.tallest.max(f64::from(reach) * scale);
         }
         // The box of a tree is no wider than twice its reach. Mip 0 is used up to sqrt 2 texels a pixel; and views 10 degrees
         // apart differ by less than a pixel under about eleven pixels: sin 10 degrees of half the size.
         let widest = 2.0 * self.tallest * eye.pixels_at_1m;
-        self.draw_limits = [widest * std::f64::consts::SQRT_2 / f64::from(s.view_resolution), widest / 11.0];
+        let near = widest * std::f64::consts::SQRT_2 / f64::from(s.view_resolution);
+        self.draw_limits = [near, widest / 11.0, (CONVERGED * self.range).max(widest / 11.0)];
         if area_density <= 0.0 {
             self.range = 0.0;
             return;
         }
+        let corner = |k: usize| eye.position[k].abs().max((scene.terrain.extent[k] - eye.position[k]).abs());
+        let farthest = corner(0).hypot(corner(1)).hypot(eye.position[2]);
+        let reach = self.range.min(farthest);
         if self.pattern_density > 0.0 {
             let pattern = Pattern::new(PATTERN_POINTS, scene.seed);
             self.tile_side = (pattern.mean_points() / self.pattern_density).sqrt();
             self.tiles_per_quad = 4;
-            while self.range > QUADS_IN_RANGE * self.tile_side * f64::from(self.tiles_per_quad) {
+            while reach > QUADS_IN_RANGE * self.tile_side * f64::from(self.tiles_per_quad) {
                 self.tiles_per_quad *= 2;
             }
             self.quad_side = self.tile_side * f64::from(self.tiles_per_quad);
@@ -184,7 +246,7 @@ impl Plan {
             self.pattern = Some(pattern);
         } else {
             // About a thousand listed trees a quad, if they stood evenly.
-            self.quad_side = (1000.0 / area_density).sqrt().max(self.range / QUADS_IN_RANGE);
+            self.quad_side = (1000.0 / area_density).sqrt().max(reach / QUADS_IN_RANGE);
             self.region_capacity = 0;
         }
         self.region_capacity =
@@ -193,7 +255,7 @@ impl Plan {
         let storage = device.map_or(ASSUMED_STORAGE, |d| d.max_storage_bytes.min(1 << 30));
         let across = |k: usize| {
             let exist = (scene.terrain.extent[k] / self.quad_side).ceil().max(1.0);
-            (2.0 * ((self.range + self.tallest) / self.quad_side + 2.0).ceil() + 1.0).min(exist)
+            (2.0 * ((reach + self.tallest) / self.quad_side + 2.0).ceil() + 1.0).min(exist)
         };
         let region_bytes = u64::from(self.region_capacity) * size_of::<gpu::Seed>() as u64;
         let most = (storage / region_bytes).min(device.map_or(2048, |d| d.max_layers).into()).max(1);
@@ -290,7 +352,7 @@ impl Plan {
             );
         }
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
-        let colour = if self.layers { 8 + 8 + 4 } else { 8 };
+        let colour = if self.layers { 8 + 8 + 4 + 8 } else { 8 };
         let multi = if self.samples > 1 { u64::from(self.samples) * (colour + 4) } else { 0 };
         let reason = format!(
             "{} x {} pixels of {} samples{}",

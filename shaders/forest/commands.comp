@@ -1,4 +1,4 @@
-// Totals of the lists become draw commands: the camera's trees (bins one after the other, in three draws), then each
+// Totals of the lists become draw commands: the camera's trees (bins one after the other, in four draws), then each
 // cascade's casters.
 #version 450
 #extension GL_GOOGLE_include_directive : require
@@ -20,7 +20,7 @@ void main() {
     }
     // Beyond the capacity nothing was written: the host reads the totals and refuses such a frame.
     bool fits = totals.items[0] <= p.tree_capacity;
-    uint ends[CAMERA_DRAWS] = uint[](p.near_bins, p.far_bins, DISTANCE_BINS);
+    uint ends[CAMERA_DRAWS] = uint[](p.near_bins, p.far_bins, p.converged_bins, DISTANCE_BINS);
     uint first = 0u;
     for (uint k = 0u; k < CAMERA_DRAWS; k++) {
         uint end = ends[k] < DISTANCE_BINS ? starts.items[1u + ends[k]] : at;

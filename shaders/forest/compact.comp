@@ -6,6 +6,8 @@
 #include "physics/hash.glsl"
 #include "physics/views.glsl"
 #include "physics/light.glsl"
+#include "physics/tables.glsl"
+#include "physics/handover.glsl"
 #include "forest/cull.glsl"
 #include "forest/members.glsl"
 
@@ -23,6 +25,10 @@ layout(std430, binding = 9) readonly buffer Totals { uint items[]; } totals;
 layout(push_constant) uniform Push { CullParameters p; };
 layout(constant_id = 0) const int RINGS = 9;
 layout(constant_id = 1) const float RESOLUTION = 256.0;
+layout(constant_id = 2) const float TABLE_ANGLES = 16.0;
+layout(constant_id = 3) const float TABLE_DENSITIES = 8.0;
+layout(binding = 10) uniform sampler3D pair_table;
+layout(binding = 11) uniform sampler2DArray view_table;
 
 uint rank_in(uint list, uint thread) {
     uint rank = 0u, word = thread >> 5u;
@@ -40,6 +46,19 @@ uint lookup(vec3 w, out vec2 weights) {
     return layers.x | layers.y << 10u | layers.z << 20u | (below ? 1u << 31u : 0u);
 }
 
+// The light of the average tree around this one, towards which its own converges with nu (BN12, eq. 22 and 23).
+void average_light(inout Tree t, Species kind, vec3 to_camera, vec3 ground, float density, float nu) {
+    TableAngles a = table_angles(to_camera, view.v.sun_direction, ground, kind.vertical_scale);
+    vec3 at = table_coordinates(a, TABLE_ANGLES);
+    float x = table_density(density * kind.area * a.up, kind.max_thickness, TABLE_DENSITIES);
+    vec4 sky = table_view(view_table, at.z, x, float(t.species), TABLE_ANGLES, TABLE_DENSITIES);
+    vec3 sun = table_pair(pair_table, at, x, float(t.species), TABLE_ANGLES, TABLE_DENSITIES);
+    t.own = 1.0 - nu;
+    t.mean_sun = (nu * a.sun_facing) * t.sun * (sun.y + sun.z * kind.bark);
+    t.mean_lit = nu * a.sun_facing * (sun.y + sun.z);
+    t.mean_sky = nu * t.sky * (sky.y + sky.z * kind.bark);
+}
+
 Tree make_tree(Seed s, vec3 centre, Species kind) {
     View v = view.v;
     Tree t;
@@ -47,7 +66,7 @@ Tree make_tree(Seed s, vec3 centre, Species kind) {
     t.scale = s.scale;
     float angle = float(s.turn_tint & 0xffffu) * (2.0 * PI / 65536.0);
     t.turn = vec2(cos(angle), sin(angle));
-    t.species = s.species;
+    t.species = s.species_density & 0xffffu;
     t.identity = s.identity;
     // World to scaled tree space: rotate back, then divide by the half extents.
     mat3 back = mat3(t.turn.x, -t.turn.y, 0.0, t.turn.y, t.turn.x, 0.0, 0.0, 0.0, 1.0);
@@ -63,17 +82,20 @@ Tree make_tree(Seed s, vec3 centre, Species kind) {
     float texels_per_pixel = RESOLUTION * distance / (extent * v.pixels_at_1m);
     t.mip = clamp(floor(log2(max(texels_per_pixel, 1e-6)) + 0.5), 0.0, log2(RESOLUTION));
     // Trees end smoothly at their range (BN12, section 7), and where the camera enters the crown.
-    float reach = distance / (kind.range * s.scale);
+    float reach = distance / kind.range;
     vec3 eye = (back * -centre) / (kind.scale_to_metres * s.scale);
     float inside = max(length(eye.xy), abs(eye.z));
-    t.fade = (1.0 - smoothstep(v.fade_distance, 1.0, reach)) * smoothstep(1.05, 1.35, inside);
-    vec2 ground = unpackHalf2x16(s.ground_light);
+    t.fade = tree_fade(reach, unit(hash(s.identity ^ HASH_FADE))) * smoothstep(1.05, 1.35, inside);
+    vec3 ground = normalize(vec3(-unpackHalf2x16(s.slope), 1.0));
+    float density = unpackHalf2x16(s.species_density).y;
+    density *= density;
     float tint = 1.0 + 0.3 * (float(s.turn_tint >> 16u) / 65535.0 - 0.5);
     vec3 phase = leaf_phase(to_camera, v.sun_direction, kind.reflectance, kind.transmittance);
     t.sun = tint * phase * hotspot(to_camera, v.sun_direction, v.hotspot_amplitude, v.hotspot_width) * v.sun_irradiance;
     // rho / 2 of a leaf that the upper hemisphere lights, times the visibility of the sky above a slope (BN12, eq. 9).
-    t.sky = tint * (kind.reflectance + kind.transmittance) * (0.25 * (1.0 + ground.x)) * v.sky_radiance;
-    t.hole = ground.y * ground.y / (v.hole_radius * v.hole_radius);
+    t.sky = tint * (kind.reflectance + kind.transmittance) * (0.25 * (1.0 + ground.z)) * v.sky_radiance;
+    t.hole = density / (v.hole_radius * v.hole_radius);
+    average_light(t, kind, to_camera, ground, density, converged(reach));
     uint cascade = 0u;
     for (uint c = 0u; c + 1u < v.cascade_count; c++) cascade += distance > v.cascade_far[c] ? 1u : 0u;
     t.cascade = v.cascade_count == 0u || distance > v.cascade_far[v.cascade_count - 1u] ? MAX_CASCADES : cascade;
@@ -89,7 +111,7 @@ void main() {
     if (seen == 0u || totals.items[0] > p.tree_capacity) return;
     SeedQuad q = quads.items[group / p.groups_per_region];
     Seed s = seeds.items[q.region * p.region_capacity + (group % p.groups_per_region) * CULL_GROUP + thread];
-    Species kind = species.items[s.species];
+    Species kind = species.items[s.species_density & 0xffffu];
     uint index = counts.items[group] + rank_in(0u, thread);
     trees.items[index] = make_tree(s, tree_centre(view.v, q, s, kind), kind);
     if ((seen & CLASS_CAMERA) != 0u) {

@@ -16,7 +16,7 @@ void main() {
     Seed s = seeds.items[gl_VertexIndex >> 2];
     // Texel centres of the border lie on the quad's edges, so that neighbouring tiles agree there.
     float texels_per_metre = (SIDE - 1.0) / tile.side;
-    radius = species.items[s.species].crown_radius * s.scale * texels_per_metre;
+    radius = species.items[s.species_density & 0xffffu].crown_radius * s.scale * texels_per_metre;
     vec2 corner = vec2((gl_VertexIndex & 1) == 0 ? -1.0 : 1.0, (gl_VertexIndex & 2) == 0 ? -1.0 : 1.0);
     from_centre = corner * (radius + 1.0);
     vec2 at = (tile.offset + s.position) * texels_per_metre + 0.5 + from_centre;

@@ -24,7 +24,8 @@ void main() {
     uint seen = 0u;
     if (slot < draws.items[q.region].index_count / 6u) {
         Seed s = seeds.items[q.region * p.region_capacity + slot];
-        seen = classify(view.v, species.items[s.species], tree_centre(view.v, q, s, species.items[s.species]), s.scale);
+        Species kind = species.items[s.species_density & 0xffffu];
+        seen = classify(view.v, kind, tree_centre(view.v, q, s, kind), s.scale);
     }
     classes.items[gl_WorkGroupID.x * CULL_GROUP + thread] = seen;
     enlist(seen, thread);

@@ -20,9 +20,8 @@ float precise_dot(vec3 a, vec3 b) {
 // 0 if no one sees it.
 uint classify(View v, Species kind, vec3 centre, float scale) {
     precise float radius = kind.bounding_radius * scale;
-    precise float range = kind.range * scale;
     precise float d2 = precise_dot(centre, centre);
-    precise float range2 = range * range;
+    precise float range2 = kind.range * kind.range;
     if (d2 > range2) return 0u;
     uint seen = 0u;
     bool inside = true;

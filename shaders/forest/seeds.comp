@@ -36,19 +36,19 @@ bool candidate(SeedQuad q, uint index, uint pattern_count, out Seed s) {
     vec2 corner = vec2(q.texel) * p.cell_size + q.texel_offset * p.cell_size;
     bool is_listed = index >= pattern_count;
     ListedTree tree = ListedTree(vec2(0.0), 0.0, -1.0, 0u, 0u);
-    uint id;
+    uint id, kind = 0u;
     if (is_listed) {
         tree = listed.items[q.first_position + index - pattern_count];
         s.position = tree.position;
-        s.species = tree.species;
+        kind = tree.species;
         id = hash2(p.seed, hash2(0x9e3779b9u + tree.species, tree.index));
     } else {
         uint slot = index % p.points_per_tile, k = index / p.points_per_tile;
         ivec2 within = ivec2(k % p.tiles_per_side, k / p.tiles_per_side);
         ivec2 tile = q.tile + within;
-        uint kind = edge_colour(tile, 1u) | edge_colour(tile + ivec2(0, 1), 1u) << 1u | edge_colour(tile, 2u) << 2u |
+        uint wang = edge_colour(tile, 1u) | edge_colour(tile + ivec2(0, 1), 1u) << 1u | edge_colour(tile, 2u) << 2u |
                     edge_colour(tile + ivec2(1, 0), 2u) << 3u;
-        vec2 point = pattern.items[kind * p.points_per_tile + slot].position;
+        vec2 point = pattern.items[wang * p.points_per_tile + slot].position;
         if (point.x < 0.0) return false;
         s.position = (vec2(within) + point) * p.tile_side;
         id = hash2(p.seed, hash2(uint(tile.x), hash2(uint(tile.y), slot)));
@@ -66,20 +66,20 @@ bool candidate(SeedQuad q, uint index, uint pattern_count, out Seed s) {
     if (!is_listed) {
         if (!(unit(hash(id ^ HASH_THIN)) * p.pattern_density < total)) return false;
         float pick = unit(hash(id ^ HASH_SPECIES)) * total;
-        s.species = 0u;
         for (uint k = 0u; k < scene_size.species_count; k++) {
-            if (densities_here[k] > 0.0) s.species = k;
+            if (densities_here[k] > 0.0) kind = k;
             pick -= densities_here[k];
             if (pick < 0.0) break;
         }
     }
-    vec2 range = species.items[s.species].scale_range;
+    vec2 range = species.items[kind].scale_range;
     s.scale = tree.scale > 0.0 ? tree.scale : mix(range.x, range.y, unit(hash(id ^ HASH_SCALE)));
     uint turn = tree.turn >= 0.0 ? uint(tree.turn * 65536.0) & 0xffffu : hash(id ^ HASH_TURN) & 0xffffu;
     s.turn_tint = turn | (hash(id ^ HASH_TINT) & 0xffff0000u);
     s.ground = g.x;
     s.identity = id;
-    s.ground_light = packHalf2x16(vec2(inversesqrt(1.0 + slope * slope), sqrt(total)));
+    s.slope = packHalf2x16(g.yz);
+    s.species_density = kind | packHalf2x16(vec2(0.0, sqrt(total)));
     return true;
 }
 

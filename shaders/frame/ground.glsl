@@ -1,4 +1,4 @@
-// Light on the ground (BN12, eq. 10-12): sun and sky part of its radiance.
+// Light on the ground (BN12, eq. 10-12) and of the forest far away.
 #include "physics/light.glsl"
 #include "physics/shadow.glsl"
 
@@ -14,43 +14,65 @@ layout(binding = 6) uniform sampler2DArray coverage;
 layout(std430, binding = 7) readonly buffer Pages { uint items[]; } pages;
 layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
 
-// Coverage by trees here, and the expected coverage for the local density: (Gamma, 1 - exp(-Lambda A)), see BN12 eq. 10.
-vec2 ground_coverage() {
+#include "frame/shader_map.glsl"
+
+struct Cover { float coverage; float thickness[MAX_SPECIES]; };
+Cover ground_cover() {
+    Cover c;
     vec2 at = (view.v.quad_offset + position.xy) / view.v.quad_side;
     vec2 quad = floor(at);
     ivec2 q = view.v.quad_camera + ivec2(quad);
-    // Pages hold the quads around the camera; farther ones would wrap around.
     bool held = all(lessThan(abs(quad), vec2(0.5 * float(GRID_SIDE) - 1.0)));
     uint page = pages.items[(q.x & int(GRID_SIDE - 1u)) + int(GRID_SIDE) * (q.y & int(GRID_SIDE - 1u))];
-    if (!held || page == NO_PAGE) return vec2(0.0);
+    for (int k = 0; k < MAX_SPECIES; k++) c.thickness[k] = 0.0;
+    c.coverage = 0.0;
+    if (!held || page == NO_PAGE) return c;
     float side = float(textureSize(coverage, 0).x);
-    return textureLod(coverage, vec3(((at - quad) * (side - 1.0) + 0.5) / side, float(page)), 0.0).rg;
+    vec2 t = textureLod(coverage, vec3(((at - quad) * (side - 1.0) + 0.5) / side, float(page)), 0.0).rg;
+    c.coverage = t.x;
+    c.thickness[0] = -log(max(1.0 - t.y, 1.0 / 256.0));
+    return c;
 }
 
-void ground_light(out vec3 sun, out vec3 sky) {
+struct GroundLight {
+    vec3 sun, sky;  // parts of the radiance
+    float trees;    // share of the pixel that is trees of the shader-map
+    vec4 fractions; // lit and shadowed ground, lit and shadowed trees
+};
+
+// How much of the sun the shadow maps leave.
+float shadow_maps(vec3 n, float cosine, float distance) {
+    uint c = 0u;
+    for (uint k = 0u; k + 1u < view.v.cascade_count; k++) c += distance > view.v.cascade_far[k] ? 1u : 0u;
+    if (view.v.cascade_count == 0u || distance > view.v.cascade_far[view.v.cascade_count - 1u]) return 1.0;
+    // A texel of the map spans ground of differing depth: move the lookup out of the surface by its half diagonal, more
+    // where the sun grazes.
+    float texel = view.v.cascade_texel[c];
+    vec3 from = position + n * (texel * 1.5 * sqrt(1.0 - cosine * cosine)) + view.v.sun_direction * (0.5 * texel);
+    return sun_visibility(shadow_map, (view.v.cascade_from_world[c] * vec4(from, 1.0)).xyz, c);
+}
+
+// Ground and, where trees are not drawn one by one, the trees on it (BN12, eq. 11-13 and 24-27).
+GroundLight ground_light() {
     vec2 slope = textureLod(slope_tiles, vec3(slope_at, float(layer)), 0.0).rg;
     vec3 n = normalize(vec3(-slope, 1.0));
     vec2 world = (vec2(view.v.grid_camera) * p.step + view.v.grid_offset + position.xy) / p.extent;
     vec3 reflectance = textureLod(albedo, vec3(world.x, 1.0 - world.y, 0.0), 0.0).rgb;
-    float distance = length(position), visible = 1.0;
+    float distance = length(position);
     float cosine = max(dot(n, view.v.sun_direction), 0.0);
-    uint c = 0u;
-    for (uint k = 0u; k + 1u < view.v.cascade_count; k++) c += distance > view.v.cascade_far[k] ? 1u : 0u;
-    if (view.v.cascade_count > 0u && distance <= view.v.cascade_far[view.v.cascade_count - 1u]) {
-        // A texel of the map spans ground of differing depth: move the lookup out of the surface by its half diagonal,
-        // more where the sun grazes.
-        float texel = view.v.cascade_texel[c];
-        vec3 from = position + n * (texel * 1.5 * sqrt(1.0 - cosine * cosine)) + view.v.sun_direction * (0.5 * texel);
-        visible = sun_visibility(shadow_map, (view.v.cascade_from_world[c] * vec4(from, 1.0)).xyz, c);
-        // Shadows end smoothly, not at a line.
-        visible = mix(visible, 1.0, smoothstep(0.8, 1.0, distance / view.v.cascade_far[view.v.cascade_count - 1u]));
-    }
-    sun = reflectance * (cosine * visible / PI) * view.v.sun_irradiance;
-    // And so do the trees above.
-    vec2 cover = ground_coverage() * (1.0 - smoothstep(0.8, 1.0, distance / view.v.range));
-    // Lambda A from 1 - exp(-Lambda A); eight bits tell up to 5.5.
-    float thickness = -log(max(1.0 - cover.y, 1.0 / 256.0));
-    float open = 0.5 * (1.0 + n.z) * ground_visibility(thickness) *
-                 ground_contrast(cover.x, cover.y, view.v.ground_contrast);
-    sky = reflectance * open * view.v.sky_radiance;
+    Cover cover = ground_cover();
+    ForestPixel f = shader_map(position * (-1.0 / max(distance, 1e-6)), n, distance, cover.thickness);
+    float lit = HAS_SUN ? mix(shadow_maps(n, cosine, distance), f.ground_lit, f.converged) : 0.0;
+    float contrast = mix(ground_contrast(cover.coverage, f.expected, view.v.ground_contrast),
+                         ground_contrast(f.seen_coverage, f.expected, view.v.ground_contrast), f.converged);
+    float open = open_ground(f.over, f.share, cover.coverage, f.expected);
+    GroundLight g;
+    vec3 sun = reflectance * (cosine * lit / PI) * view.v.sun_irradiance;
+    vec3 sky = reflectance * (0.5 * (1.0 + n.z) * f.sky * contrast) * view.v.sky_radiance;
+    g.sun = mix(f.tree_sun, sun, open);
+    g.sky = mix(f.tree_sky, sky, open);
+    g.trees = 1.0 - open;
+    if (cosine <= 0.0) lit = 0.0;
+    g.fractions = vec4(open * vec2(lit, 1.0 - lit), (1.0 - open) * vec2(f.tree_lit, 1.0 - f.tree_lit));
+    return g;
 }

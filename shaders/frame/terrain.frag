@@ -7,7 +7,6 @@
 layout(location = 0) out vec4 radiance;
 
 void main() {
-    vec3 sun, sky;
-    ground_light(sun, sky);
-    radiance = vec4(sun + sky, 1.0);
+    GroundLight g = ground_light();
+    radiance = vec4(g.sun + g.sky, 1.0);
 }

@@ -1,4 +1,4 @@
-// The ground: sun and sky part apart, no tree.
+// The ground: sun and sky part apart, what of it is trees in the sky part's fourth channel, fractions.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
@@ -6,12 +6,13 @@
 
 layout(location = 0) out vec4 sun_part;
 layout(location = 1) out vec4 sky_part;
-layout(location = 2) out uint species;
+layout(location = 2) out uint species_layer;
+layout(location = 3) out vec4 fractions;
 
 void main() {
-    vec3 sun, sky;
-    ground_light(sun, sky);
-    sun_part = vec4(sun, 1.0);
-    sky_part = vec4(sky, 0.0);
-    species = 0u;
+    GroundLight g = ground_light();
+    sun_part = vec4(g.sun, 1.0);
+    sky_part = vec4(g.sky, g.trees);
+    species_layer = 0u;
+    fractions = g.fractions;
 }

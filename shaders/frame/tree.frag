@@ -8,6 +8,7 @@ layout(location = 0) out vec4 radiance;
 
 void main() {
     vec3 sun_part, sky_part;
-    shade(sun_part, sky_part);
+    float lit;
+    shade(sun_part, sky_part, lit);
     radiance = vec4(sun_part + sky_part, 1.0);
 }

@@ -31,6 +31,8 @@ layout(location = 20) flat out vec4 sky;        // w: metres from the centre to 
 layout(location = 21) flat out uvec4 tree_bits; // mask row; cascade | from below << 4 | species << 8
 layout(location = 22) flat out float dither;
 layout(location = 23) flat out vec4 bark;       // relative colour; w: height under which there is only bark
+layout(location = 24) flat out vec4 mean_sun;   // average light, times nu; w: 1 - nu
+layout(location = 25) flat out vec4 mean_sky;   // w: average lit fraction, times nu
 
 void main() {
     View v = view.v;
@@ -81,5 +83,7 @@ void main() {
     uvec3 row = masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz;
     tree_bits = uvec4(row, t.cascade | (below ? 16u : 0u) | t.species << 8u);
     bark = vec4(kind.bark, kind.crown_base);
+    mean_sun = vec4(t.mean_sun, t.own);
+    mean_sky = vec4(t.mean_sky, t.mean_lit);
     dither = unit(hash(t.identity ^ HASH_DITHER));
 }

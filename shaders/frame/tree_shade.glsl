@@ -18,6 +18,8 @@ layout(location = 20) flat in vec4 sky;
 layout(location = 21) flat in uvec4 tree_bits;
 layout(location = 22) flat in float dither;
 layout(location = 23) flat in vec4 bark;
+layout(location = 24) flat in vec4 mean_sun;
+layout(location = 25) flat in vec4 mean_sky;
 
 layout(binding = 6) uniform sampler2DArray views;
 layout(binding = 7) uniform usampler2DArray shadow_map;
@@ -26,9 +28,10 @@ layout(constant_id = 4) const uint ESTIMATES = 1u;
 layout(constant_id = 7) const bool MAGNIFIED = false;
 layout(constant_id = 5) const int LIGHT_ITERATIONS = 1;
 layout(constant_id = 6) const bool HAS_SUN = true;
+layout(constant_id = 8) const bool CONVERGED = false; // to the average light: nothing of the tree's own is left
 
-// Returns the species, counted from 1. Sets sample mask and depth.
-uint shade(out vec3 sun_part, out vec3 sky_part) {
+// Returns the species, counted from 1. Sets sample mask and depth. `lit` is the fraction of the sun that arrives.
+uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
     vec3 p[3], d[3];
     for (int i = 0; i < 3; i++) {
         p[i] = view_p[i].xyz;
@@ -46,9 +49,16 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
     // Reverse Z: depth is near / distance, and the distance shrinks by 1 - s.
     gl_FragDepth = min(gl_FragCoord.z / (1.0 - s), 1.0);
 
-    sun_part = vec3(0.0);
+    sun_part = mean_sun.rgb;
+    sky_part = mean_sky.rgb;
+    lit = HAS_SUN ? mean_sky.w : 0.0;
+    uint species = (tree_bits.w >> 8u) + 1u;
+    if (CONVERGED) return species;
+    // Under the crown there is only bark; half a metre or so of transition.
+    float height = mix(view_p[0].w, optics.w, s);
+    vec3 colour = mean_sun.w * mix(bark.rgb, vec3(1.0), smoothstep(bark.w - 0.05, bark.w + 0.05, height));
     if (HAS_SUN) {
-        float lit = 1.0, metres = 0.0;
+        float through = 1.0, metres = 0.0;
         if (LIGHT_ITERATIONS > 0) {
             vec3 lp[3], ld[3];
             for (int i = 0; i < 3; i++) {
@@ -69,21 +79,18 @@ uint shade(out vec3 sun_part, out vec3 sky_part) {
                 }
             }
             metres = max(metres, 0.0);
-            lit = exp(-optics.y * metres);
+            through = exp(-optics.y * metres);
         }
         vec3 entry = mix(shadow_p, shadow_c.xyz, s);
         entry.z += metres * shadow_c.w;
         uint cascade = tree_bits.w & 15u;
         float visible = sun_visibility(shadow_map, entry, min(cascade, 3u));
-        sun_part = sun.rgb * (lit * (cascade < 4u ? visible : 1.0));
+        through *= cascade < 4u ? visible : 1.0;
+        sun_part += sun.rgb * colour * through;
+        lit += mean_sun.w * through;
     }
     // Depth under the top of the canopy, for the sky through the hole around the tree.
-    float height = mix(view_p[0].w, optics.w, s);
     float below_top = max(1.0 - height, 0.0) * sky.w;
-    sky_part = sky.rgb * (at.occlusion / (1.0 + below_top * below_top * sun.w));
-    // Under the crown there is only bark; half a metre or so of transition.
-    vec3 colour = mix(bark.rgb, vec3(1.0), smoothstep(bark.w - 0.05, bark.w + 0.05, height));
-    sun_part *= colour;
-    sky_part *= colour;
-    return (tree_bits.w >> 8u) + 1u;
+    sky_part += sky.rgb * colour * (at.occlusion / (1.0 + below_top * below_top * sun.w));
+    return species;
 }

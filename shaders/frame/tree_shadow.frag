@@ -1,7 +1,9 @@
-// Back depth and opacity of one tree as the sun sees it (BN12, section 5): the back, so that no tree shadows its own lit
-// side, and both in one texel, so that depth and opacity are always of the same tree.
+// Back depth of one tree as the sun sees it (BN12, section 5): the back, so that no tree shadows its own lit side. A texel
+// holds one tree, and the opacity of others behind it would be lost, more of it the coarser the map. So opacity is the
+// probability of being there: behind several trees the expected light is then the product of what each lets through.
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#include "physics/hash.glsl"
 #include "physics/zfield.glsl"
 #include "physics/shadow.glsl"
 
@@ -10,6 +12,7 @@ layout(location = 3) in float depth;
 layout(location = 4) flat in vec4 light_d[3];
 layout(location = 7) flat in vec4 optics;
 layout(location = 8) flat in float depth_per_metre;
+layout(location = 9) flat in uint dither;
 layout(binding = 5) uniform sampler2DArray views;
 layout(location = 0) out uint caster;
 
@@ -22,9 +25,10 @@ void main() {
     vec3 layers = vec3(light_d[0].w, light_d[1].w, light_d[2].w);
     vec3 w = vec3(optics.xy, 1.0 - optics.x - optics.y);
     Surface back = zfield_fetch(views, p, d, 1.0 / vec3(d[0].z, d[1].z, d[2].z), layers, w, optics.z, 0.0, true, false);
-    float opacity = back.opacity * optics.w;
-    if (opacity < 1.0 / 64.0) discard;
+    // Texels side by side get dithers far apart: steps of the plastic number's powers (Roberts 2018, "R2 sequence").
+    uvec2 at = uvec2(gl_FragCoord.xy);
+    if (back.opacity * optics.w <= unit(dither + at.x * 3242174889u + at.y * 2447445413u)) discard;
     float z = clamp(depth + back.s * depth_per_metre, 0.0, 1.0);
     gl_FragDepth = z;
-    caster = pack_caster(z, opacity);
+    caster = pack_caster(z, 1.0);
 }

@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_ARB_shader_viewport_layer_array : require
 #include "interface.glsl"
+#include "physics/hash.glsl"
 #include "physics/zfield.glsl"
 #include "frame/tree_space.glsl"
 
@@ -20,6 +21,7 @@ layout(location = 3) out float depth;
 layout(location = 4) flat out vec4 light_d[3]; // w: layer
 layout(location = 7) flat out vec4 optics;     // weights of two views, mip, opacity factor
 layout(location = 8) flat out float depth_per_metre;
+layout(location = 9) flat out uint dither;
 
 void main() {
     View v = view.v;
@@ -47,6 +49,7 @@ void main() {
     depth = at.z;
     depth_per_metre = (shadow * vec4(v.sun_direction, 0.0)).z;
     optics = vec4(t.light_weights, mip, t.fade);
+    dither = hash(t.identity ^ HASH_DITHER ^ cascade);
     // Trees before the cascade's near side cast from there: the fragment writes their depth.
     gl_Position = vec4(at.xy, 0.5, 1.0);
     gl_Layer = int(cascade);

@@ -5,11 +5,15 @@ mod occlusion;
 mod optics;
 mod raster;
 mod rays;
+mod scene;
 mod surface;
+mod tables;
 mod verify;
 mod views;
 
 pub use cache::{CacheState, load_or_bake};
+pub use scene::{Baked, BakedFrom, forest_settings, load_or_bake_scene, pattern_density};
+pub use tables::{ForestSettings, ForestTables, load_or_measure};
 pub use verify::{QualityReport, ViewQuality, verify};
 
 use crate::progress::Progress;

@@ -5,6 +5,7 @@ mod devices;
 mod options;
 mod output;
 mod plan;
+mod reflectance;
 mod render;
 mod tree;
 
@@ -37,6 +38,8 @@ struct Cli {
 enum Command {
     /// Draw one image of a scene: PNG, and linear EXR with named layers.
     Render(render::Args),
+    /// Radiance of a patch of the scene's forest against view angle, sun angle and distance, as CSV.
+    Reflectance(reflectance::Args),
     /// Precompute a tree model ahead of time (otherwise done on first use), and measure how good it is.
     Bake(bake::Args),
     /// Write a procedural tree as binary glTF.
@@ -51,6 +54,7 @@ enum Command {
 pub fn run() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Render(args) => render::run(&args),
+        Command::Reflectance(args) => reflectance::run(&args),
         Command::Bake(args) => bake::run(&args),
         Command::Tree(args) => tree::run(&args),
         Command::Plan(args) => plan::run(&args),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use canopy::bake::{SpeciesBake, cache, load_or_bake};
+use canopy::bake::{Baked, cache, load_or_bake_scene};
 use canopy::frame::{FrameReport, Renderer, auto_exposure};
 use canopy::gpu::{DeviceInfo, Gpu, GpuOptions, PassTime};
 use canopy::plan::Plan;
@@ -103,6 +103,7 @@ struct Timings {
 struct Bake<'a> {
     species: &'a str,
     cache: &'static str,
+    tables: &'static str,
 }
 
 #[derive(serde::Serialize)]
@@ -177,13 +178,12 @@ fn draw(args: &Args, gpu: &Gpu, scene: Scene, camera: &Camera, png: PathBuf, loa
     let plan = Plan::new(&scene, camera, args.scene.size, args.exr.is_some(), Some(gpu.info()))?;
     let scene = Arc::new(scene);
     let start = Instant::now();
-    let (mut baked, mut states): (Vec<Arc<SpeciesBake>>, Vec<Bake>) = (Vec::new(), Vec::new());
-    let dir = cache::default_dir();
-    for s in &scene.species {
-        let (bake, state) =
-            load_or_bake(&s.mesh, &s.optics, &(&scene.settings).into(), dir.as_deref(), quiet)?;
-        baked.push(Arc::new(bake));
-        states.push(Bake { species: &s.name, cache: super::bake::state(state) });
+    let (mut baked, mut states): (Vec<Baked>, Vec<Bake>) = (Vec::new(), Vec::new());
+    let found = load_or_bake_scene(&scene, cache::default_dir().as_deref(), quiet)?;
+    for (s, (bake, from)) in scene.species.iter().zip(found) {
+        baked.push(bake);
+        let (cache, tables) = (super::bake::state(from.species), super::bake::state(from.tables));
+        states.push(Bake { species: &s.name, cache, tables });
     }
     let bake_s = start.elapsed().as_secs_f64();
 

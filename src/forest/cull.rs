@@ -6,11 +6,12 @@
 
 use super::seeds::SeedData;
 use super::species::SpeciesData;
+use super::tables::TableData;
 use crate::gpu::interface::{
     CAMERA_DRAWS, CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, MAX_CASCADES, Seed, SeedQuad,
     Species, TREE_LISTS, Tree, View,
 };
-use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, shaders};
+use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
 use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -28,7 +29,7 @@ pub struct CullData {
     pub trees: Buffer,
     /// Indices into `trees`: the camera's, then each cascade's, `tree_capacity` apart.
     pub lists: Buffer,
-    /// Draw commands: the camera's near, middle and far trees, then each cascade's.
+    /// Draw commands: the camera's near, middle, far and converged trees, then each cascade's.
     pub commands: Buffer,
     /// Number of trees in each list.
     pub totals: Buffer,
@@ -38,8 +39,9 @@ pub struct CullData {
     starts: Buffer,
     programs: [Program; 4],
     capacity: u32,
-    /// Distances under which a tree's texels may be magnified, and from which it covers few pixels, m.
-    draw_limits: [f64; 2],
+    /// Distances under which a tree's texels may be magnified, from which it covers few pixels, and from which its light
+    /// is the average, m.
+    draw_limits: [f64; 3],
     range: f64,
 }
 
@@ -59,12 +61,17 @@ impl CullData {
     ///
     /// # Errors
     /// [`Error::Device`] when out of memory.
-    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, tables: &TableData) -> Result<Self> {
         let slots = u64::from(plan.seed_regions) * u64::from(plan.region_capacity);
         let groups = slots / u64::from(CULL_GROUP);
         let trees = u64::from(plan.tree_capacity);
-        let constants =
-            [(0, scene.settings.view_rings), (1, (scene.settings.view_resolution as f32).to_bits())];
+        let float = |n: u32| (n as f32).to_bits();
+        let constants = [
+            (0, scene.settings.view_rings),
+            (1, float(scene.settings.view_resolution)),
+            (2, float(tables.angles)),
+            (3, float(tables.densities)),
+        ];
         Ok(CullData {
             trees: gpu.buffer("trees", trees * size_of::<Tree>() as u64)?,
             lists: gpu.buffer("tree lists", trees * 4 * u64::from(1 + MAX_CASCADES))?,
@@ -89,7 +96,14 @@ impl CullData {
     }
 
     /// Records the cull of `seeds.visible` quads.
-    pub fn record(&self, recorder: &mut Recorder, view: &Buffer, seeds: &SeedData, species: &SpeciesData) {
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        seeds: &SeedData,
+        species: &SpeciesData,
+        tables: &TableData,
+    ) {
         let groups_per_region = seeds.region_capacity / CULL_GROUP;
         let parameters = CullParameters {
             group_count: seeds.visible * groups_per_region,
@@ -98,6 +112,7 @@ impl CullData {
             tree_capacity: self.capacity,
             near_bins: first_bin_from(self.draw_limits[0], self.range),
             far_bins: first_bin_from(self.draw_limits[1], self.range),
+            converged_bins: first_bin_from(self.draw_limits[2], self.range),
         };
         let shared = [
             ("view", Resource::Buffer(view)),
@@ -112,6 +127,8 @@ impl CullData {
             ("commands", Resource::Buffer(&self.commands)),
             ("trees", Resource::Buffer(&self.trees)),
             ("lists", Resource::Buffer(&self.lists)),
+            ("pair_table", Resource::Texture(&tables.pairs, Sampler::Linear)),
+            ("view_table", Resource::Texture(&tables.views, Sampler::Linear)),
         ];
         let groups = [parameters.group_count, 1, 1];
         for (name, program, size) in [
@@ -170,9 +187,8 @@ pub fn tree_centre(view: &View, quad: &SeedQuad, seed: &Seed, species: &Species)
 pub fn classify(view: &View, species: &Species, centre: [f32; 3], scale: f32) -> u32 {
     let dot = |a: &[f32]| (a[0] * centre[0] + a[1] * centre[1]) + a[2] * centre[2];
     let radius = species.bounding_radius * scale;
-    let range = species.range * scale;
     let d2 = dot(&centre);
-    if d2 > range * range {
+    if d2 > species.range * species.range {
         return 0;
     }
     let mut seen = 0;

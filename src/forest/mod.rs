@@ -3,8 +3,10 @@
 
 pub mod cache;
 pub mod cull;
+pub mod density;
 pub mod pattern;
 pub mod quadtree;
 pub mod seeds;
 pub mod species;
+pub mod tables;
 pub mod terrain;

@@ -1,8 +1,7 @@
 //! Species on the GPU: the table, the z-field views of all species in one array, view bases, masks and density maps.
 
-use std::sync::Arc;
-
-use crate::bake::{SpeciesBake, ZField};
+use super::density::{HEIGHT_SOFTNESS, SLOPE_SOFTNESS};
+use crate::bake::{Baked, ZField};
 use crate::gpu::interface::{NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
 use crate::physics::masks::combination_table;
@@ -15,6 +14,8 @@ use crate::{Error, Result};
 pub struct SpeciesData {
     /// Rows of the table, also for the CPU's twin of the cull.
     pub rows: Vec<Row>,
+    /// Number of species.
+    pub count: u32,
     /// The table.
     pub table: Buffer,
     /// z-field views, species after species.
@@ -34,7 +35,7 @@ impl SpeciesData {
     ///
     /// # Errors
     /// [`Error::Device`] when out of memory.
-    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, baked: &[Arc<SpeciesBake>]) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, baked: &[Baked]) -> Result<Self> {
         let n = scene.settings.view_rings;
         let view_count = views::count(n);
         let resolution = scene.settings.view_resolution;
@@ -47,7 +48,7 @@ impl SpeciesData {
             samples: 1,
             usage: vk::ImageUsageFlags::empty(),
         })?;
-        for (k, bake) in baked.iter().enumerate() {
+        for (k, bake) in baked.iter().map(|b| &b.species).enumerate() {
             if bake.views.resolution != resolution || bake.views.n != n {
                 return Err(Error::Usage("a species was baked with other settings than the scene's".into()));
             }
@@ -55,7 +56,7 @@ impl SpeciesData {
                 gpu.upload_image(&texels, level as u32, k as u32 * view_count, view_count, bytes)?;
             }
         }
-        let bases: Vec<ViewBasis> = baked.iter().flat_map(|bake| view_bases(&bake.views)).collect();
+        let bases: Vec<ViewBasis> = baked.iter().flat_map(|b| view_bases(&b.species.views)).collect();
         let maps: Vec<&Raster> = scene.species.iter().filter_map(density_map).collect();
         let size = maps.iter().fold([1, 1], |s: [u32; 2], m| [s[0].max(m.width), s[1].max(m.height)]);
         let densities = gpu.image(&ImageDesc {
@@ -83,6 +84,7 @@ impl SpeciesData {
         Ok(SpeciesData {
             table: gpu.buffer_with("species", &rows)?,
             rows,
+            count: scene.species.len() as u32,
             views: texels,
             bases: gpu.buffer_with("view bases", &bases)?,
             mask_rows: masks.len() as u32,
@@ -135,10 +137,10 @@ fn density_map(species: &crate::scene::Species) -> Option<&Raster> {
     }
 }
 
-fn rows(scene: &Scene, plan: &Plan, baked: &[Arc<SpeciesBake>], view_count: u32) -> Vec<Row> {
+fn rows(scene: &Scene, plan: &Plan, baked: &[Baked], view_count: u32) -> Vec<Row> {
     let mut next_map = 0;
     let mut rows = Vec::new();
-    for (k, (species, bake)) in scene.species.iter().zip(baked).enumerate() {
+    for (k, (species, Baked { species: bake, tables })) in scene.species.iter().zip(baked).enumerate() {
         let (mut max_density, mut between, mut slope) = (0.0, None, None);
         if let Distribution::Density { max_density: d, between_heights, below_slope, .. } =
             &species.distribution
@@ -153,7 +155,6 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Arc<SpeciesBake>], view_count: u32)
             None => NO_PAGE,
         };
         let map_size = density_map(species).map_or([1.0; 2], |m| [m.width as f32, m.height as f32]);
-        // Smooth limits: a tenth of the height range, a sixth of the slope.
         let [low, high] = between.unwrap_or([-1e30, 1e30]);
         let tangent = slope.map_or(1e30, |s| s.to_radians().tan());
         rows.push(Row {
@@ -171,12 +172,15 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Arc<SpeciesBake>], view_count: u32)
             density_layer,
             between_heights: [low, high],
             below_slope: tangent,
-            height_softness: if between.is_some() { 0.1 * (high - low) } else { 1.0 },
+            height_softness: if between.is_some() { HEIGHT_SOFTNESS * (high - low) } else { 1.0 },
             map_size,
-            slope_softness: if slope.is_some() { tangent / 6.0 } else { 1.0 },
+            slope_softness: if slope.is_some() { SLOPE_SOFTNESS * tangent } else { 1.0 },
             crown_base: (bake.crown_base - bake.center) / bake.half_height,
             // Black leaves have no colour to compare with.
             bark: std::array::from_fn(|i| bake.bark[i] / bake.albedo()[i].max(1e-3)),
+            area: tables.area,
+            vertical_scale: tables.vertical_scale,
+            max_thickness: tables.max_thickness,
             ..bytemuck::Zeroable::zeroed()
         });
     }

@@ -31,9 +31,6 @@ pub fn cascades(
     split: f64,
     texels: u32,
 ) -> Vec<Cascade> {
-    let across = cross([0.0, 0.0, 1.0], sun);
-    let x = if dot(across, across) > 1e-12 { normalize(across) } else { [1.0, 0.0, 0.0] };
-    let axes = [x, cross(sun, x), sun];
     let mut from = 0.0;
     parallel_splits(near, far.max(near * 1.01), count, split)
         .into_iter()
@@ -43,19 +40,7 @@ pub fn cascades(
             // One texel more on each side: the centre moves by up to one, and lookups filter over another.
             let half = radius * f64::from(texels) / f64::from(texels - 4);
             let texel = 2.0 * half / f64::from(texels);
-            let centre = add(eye.position, eye.forward, along);
-            // Snapped in world coordinates, then taken relative to the eye again, all in doubles.
-            let snapped =
-                |axis: [f64; 3]| (dot(axis, centre) / texel).floor() * texel - dot(axis, eye.position);
-            let centre = [snapped(axes[0]), snapped(axes[1]), snapped(axes[2])];
-            let mut planes = Vec::new();
-            for k in 0..2 {
-                let a = axes[k];
-                planes.push([a[0], a[1], a[2], half - centre[k]]);
-                planes.push([-a[0], -a[1], -a[2], half + centre[k]]);
-            }
-            planes.push([sun[0], sun[1], sun[2], half - centre[2]]);
-            Cascade { axes, centre, half, far: to, texel, planes }
+            Cascade::around(sun, eye, eye.forward.map(|f| along * f), half, texel, to)
         })
         .collect()
 }
@@ -74,6 +59,27 @@ impl Cascade {
         columns[3][2] += 0.5;
         columns[3][3] = 1.0;
         columns
+    }
+}
+
+impl Cascade {
+    /// A cascade around a point relative to the eye, snapped to whole texels.
+    pub fn around(sun: [f64; 3], eye: &Eye, target: [f64; 3], half: f64, texel: f64, far: f64) -> Self {
+        let across = cross([0.0, 0.0, 1.0], sun);
+        let x = if dot(across, across) > 1e-12 { normalize(across) } else { [1.0, 0.0, 0.0] };
+        let axes = [x, cross(sun, x), sun];
+        // Snapped in world coordinates, then taken relative to the eye again, all in doubles.
+        let world = add(eye.position, target, 1.0);
+        let snapped = |axis: [f64; 3]| (dot(axis, world) / texel).floor() * texel - dot(axis, eye.position);
+        let centre = axes.map(snapped);
+        let mut planes = Vec::new();
+        for k in 0..2 {
+            let a = axes[k];
+            planes.push([a[0], a[1], a[2], half - centre[k]]);
+            planes.push([-a[0], -a[1], -a[2], half + centre[k]]);
+        }
+        planes.push([sun[0], sun[1], sun[2], half - centre[2]]);
+        Cascade { axes, centre, half, far, texel, planes }
     }
 }
 

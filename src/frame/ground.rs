@@ -3,9 +3,10 @@
 use super::shadows::TerrainPush;
 use super::targets::ImageTargets;
 use crate::Result;
-use crate::forest::seeds::SeedData;
+use super::Forest;
+use crate::forest::tables::TableData;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
-use crate::gpu::interface::{GRID_SIDE, NO_PAGE, TERRAIN_CELLS, TERRAIN_HEIGHTS};
+use crate::gpu::interface::{GRID_SIDE, NO_PAGE, Species, TERRAIN_CELLS, TERRAIN_HEIGHTS};
 use crate::gpu::{
     Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler,
     Targets, shaders, vk,
@@ -20,6 +21,8 @@ pub struct Ground {
     /// Stand for coverage and pages in scenes without trees.
     no_coverage: Image,
     no_pages: Buffer,
+    no_species: Buffer,
+    no_tables: TableData,
 }
 
 impl Ground {
@@ -27,9 +30,10 @@ impl Ground {
     ///
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
-    pub fn new(gpu: &Gpu, plan: &Plan) -> Result<Self> {
+    pub fn new(gpu: &Gpu, plan: &Plan, forest: Option<&Forest>) -> Result<Self> {
         let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
         let side = TERRAIN_HEIGHTS;
+        let float = |n: u32| (n as f32).to_bits();
         let cells =
             (0..TERRAIN_CELLS * TERRAIN_CELLS).map(|k| (k % TERRAIN_CELLS) + side * (k / TERRAIN_CELLS));
         // Diagonals run the same way at every level, so that a morphed quad is the coarser one exactly.
@@ -48,7 +52,12 @@ impl Ground {
                 samples: plan.samples,
                 depth: DepthTest::Reverse,
                 blend: Blend::Replace,
-                constants: &[],
+                constants: &[
+                    (0, forest.map_or(0, |f| f.species.count)),
+                    (1, float(forest.map_or(1, |f| f.tables.angles))),
+                    (2, float(forest.map_or(1, |f| f.tables.densities))),
+                    (3, u32::from(plan.cascades > 0)),
+                ],
             })?,
             no_coverage: gpu.image(&ImageDesc {
                 name: "no coverage",
@@ -59,6 +68,8 @@ impl Ground {
                 samples: 1,
                 usage: vk::ImageUsageFlags::empty(),
             })?,
+            no_species: gpu.buffer("no species", size_of::<Species>() as u64)?,
+            no_tables: TableData::new(gpu, &[])?,
             no_pages: gpu.buffer_with("no pages", &vec![NO_PAGE; (GRID_SIDE * GRID_SIDE) as usize])?,
         })
     }
@@ -70,7 +81,7 @@ impl Ground {
         recorder: &mut Recorder,
         view: &Buffer,
         (terrain, draws): (&TerrainData, &TerrainDraws),
-        seeds: Option<&SeedData>,
+        forest: Option<&Forest>,
         shadow_map: &Image,
         targets: &ImageTargets,
         sky: Option<[f32; 3]>,
@@ -82,10 +93,12 @@ impl Ground {
             _ => sky.map(|_| [0.0; 4]),
         };
         let colors: Vec<_> =
-            targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), seeds.is_none())).collect();
-        let depth = Some(targets.depth.attachment(Some([0.0; 4]), seeds.is_none()));
+            targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), forest.is_none())).collect();
+        let depth = Some(targets.depth.attachment(Some([0.0; 4]), forest.is_none()));
         let (coverage, pages) =
-            seeds.map_or((&self.no_coverage, &self.no_pages), |s| (&s.coverage, &s.pages));
+            forest.map_or((&self.no_coverage, &self.no_pages), |f| (&f.seeds.coverage, &f.seeds.pages));
+        let (tables, species) =
+            forest.map_or((&self.no_tables, &self.no_species), |f| (&f.tables, &f.species.table));
         recorder.render("terrain", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
             pass.bind(
                 &self.program,
@@ -98,6 +111,9 @@ impl Ground {
                     ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
                     ("coverage", Resource::Texture(coverage, Sampler::Linear)),
                     ("pages", Resource::Buffer(pages)),
+                    ("pair_table", Resource::Texture(&tables.pairs, Sampler::Linear)),
+                    ("view_table", Resource::Texture(&tables.views, Sampler::Linear)),
+                    ("species", Resource::Buffer(species)),
                 ],
             );
             pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });

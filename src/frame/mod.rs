@@ -13,10 +13,11 @@ pub mod view;
 use std::sync::Arc;
 
 use crate::Result;
-use crate::bake::SpeciesBake;
+use crate::bake::Baked;
 use crate::forest::cull::{CullData, TreeCounts};
 use crate::forest::seeds::SeedData;
 use crate::forest::species::SpeciesData;
+use crate::forest::tables::TableData;
 use crate::forest::terrain::TerrainData;
 use crate::gpu::interface::View;
 use crate::gpu::{Buffer, Gpu, PassTime};
@@ -24,6 +25,7 @@ use crate::image::Picture;
 use crate::plan::Plan;
 use crate::scene::{Camera, Scene};
 use camera::Eye;
+use cascades::Cascade;
 use ground::Ground;
 use shadows::Shadows;
 use sky::SkyPass;
@@ -36,8 +38,10 @@ use view::Light;
 pub struct Forest {
     /// Seeds and coverage tiles.
     pub seeds: SeedData,
-    /// Species tables.
+    /// Species.
     pub species: SpeciesData,
+    /// Forest tables of the species.
+    pub tables: TableData,
     /// Culling.
     pub cull: CullData,
     pass: Trees,
@@ -77,14 +81,17 @@ impl Renderer {
     ///
     /// # Errors
     /// [`crate::Error::Device`] when out of memory.
-    pub fn new(gpu: &Gpu, scene: Arc<Scene>, plan: Plan, baked: &[Arc<SpeciesBake>]) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: Arc<Scene>, plan: Plan, baked: &[Baked]) -> Result<Self> {
         let forest = if plan.range > 0.0 {
             let species = SpeciesData::new(gpu, &scene, &plan, baked)?;
+            let tables: Vec<_> = baked.iter().map(|b| b.tables.as_ref()).collect();
+            let tables = TableData::new(gpu, &tables)?;
             Some(Forest {
                 seeds: SeedData::new(gpu, &scene, &plan)?,
-                cull: CullData::new(gpu, &scene, &plan)?,
+                cull: CullData::new(gpu, &scene, &plan, &tables)?,
                 pass: Trees::new(gpu, &scene, &plan, species.mask_rows)?,
                 species,
+                tables,
             })
         } else {
             None
@@ -93,7 +100,7 @@ impl Renderer {
             view: gpu.buffer("view", size_of::<View>() as u64)?,
             targets: ImageTargets::new(gpu, &plan)?,
             terrain: TerrainData::new(gpu, &scene, &plan)?,
-            ground: Ground::new(gpu, &plan)?,
+            ground: Ground::new(gpu, &plan, forest.as_ref())?,
             shadows: Shadows::new(gpu, &scene, &plan)?,
             sky: SkyPass::new(gpu, &scene, &plan)?,
             tonemap: Tonemap::new(gpu, &plan)?,
@@ -128,14 +135,23 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::render`].
     pub fn render_eye(&mut self, eye: &Eye, exposure: f64) -> Result<(FrameReport, View)> {
+        let highest = self.terrain.tree.total_range()[1] + self.plan.tallest;
+        let cascades = Shadows::cascades(&self.scene, &self.plan, eye, self.light.direction, highest);
+        self.draw(eye, &cascades, exposure)
+    }
+
+    /// Draws one frame from an eye with the shadow cascades given, as many as the plan has.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`].
+    pub fn draw(&mut self, eye: &Eye, cascades: &[Cascade], exposure: f64) -> Result<(FrameReport, View)> {
         let (gpu, scene, plan) = (&self.gpu, &self.scene, &self.plan);
         let sun = self.light.direction;
         let [lowest, highest] = self.terrain.tree.total_range();
-        let cascades = Shadows::cascades(scene, plan, eye, sun, highest + plan.tallest);
 
         // Stream: which quads, where in the caches, what is new.
         let pixels = f64::from(scene.settings.terrain_pixels);
-        let draws = self.terrain.update(gpu, eye, &cascades, pixels)?;
+        let draws = self.terrain.update(gpu, eye, cascades, pixels)?;
         let mut work = None;
         if let Some(forest) = &mut self.forest {
             let reach = shadow_reach(sun, plan.cascades, plan.tallest + 0.25 * (highest - lowest));
@@ -143,14 +159,14 @@ impl Renderer {
         }
         let seeds = self.forest.as_ref().map(|f| &f.seeds);
         let step = self.terrain.tree.step();
-        let view = view::view(scene, plan, eye, &self.light, &cascades, seeds, step);
+        let view = view::view(scene, plan, eye, &self.light, cascades, seeds, step);
         gpu.upload(&self.view, 0, &[view])?;
 
         let mut recorder = gpu.record()?;
         self.terrain.produce(&mut recorder, &draws);
         if let (Some(forest), Some(work)) = (&self.forest, &work) {
             forest.seeds.produce(&mut recorder, work, &self.terrain, &forest.species);
-            forest.cull.record(&mut recorder, &self.view, &forest.seeds, &forest.species);
+            forest.cull.record(&mut recorder, &self.view, &forest.seeds, &forest.species, &forest.tables);
         }
         let trees = self.forest.as_ref().map(|f| (&f.cull, &f.seeds, &f.species));
         let ground = (&self.terrain, &draws);
@@ -160,7 +176,8 @@ impl Renderer {
         }
         let clear = self.sky.is_none().then(|| self.light.sky.map(|c| (c * self.light.scale) as f32));
         let shadow_map = &self.shadows.map;
-        self.ground.record(&mut recorder, &self.view, ground, seeds, shadow_map, &self.targets, clear);
+        let forest = self.forest.as_ref();
+        self.ground.record(&mut recorder, &self.view, ground, forest, shadow_map, &self.targets, clear);
         if let Some(forest) = &self.forest {
             forest.pass.record(&mut recorder, &self.view, forest, shadow_map, &self.targets);
         }

@@ -44,7 +44,8 @@ impl ColorTarget {
 
 /// All targets of a plan.
 pub struct ImageTargets {
-    /// Radiance; with layers: sun part, sky part (with coverage in alpha), species.
+    /// Radiance; with layers: sun part, sky part (with coverage in alpha), species, fractions (lit and shadowed ground,
+    /// lit and shadowed trees).
     pub colors: Vec<ColorTarget>,
     /// Depth.
     pub depth: ColorTarget,
@@ -80,7 +81,12 @@ impl ImageTargets {
     /// Colour attachments with and without layers.
     pub fn formats(layers: bool) -> &'static [(&'static str, gpu::vk::Format)] {
         if layers {
-            &[("sun part", RADIANCE), ("sky part", RADIANCE), ("species", SPECIES)]
+            &[
+                ("sun part", RADIANCE),
+                ("sky part", RADIANCE),
+                ("species", SPECIES),
+                ("fractions", RADIANCE),
+            ]
         } else {
             &[("radiance", RADIANCE)]
         }

@@ -13,7 +13,8 @@ use crate::scene::Scene;
 
 /// Draws z-field trees.
 pub struct Trees {
-    /// For the near, middle and far bins: texels magnified, estimates filtered; not magnified; without estimates.
+    /// For the near, middle, far and converged bins: texels magnified, estimates filtered; not magnified; without
+    /// estimates; and without light of its own.
     programs: [Program; CAMERA_DRAWS as usize],
 }
 
@@ -26,7 +27,7 @@ impl Trees {
         let s = &scene.settings;
         let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
         let before = s.view_iterations - 1;
-        let program = |estimates: u32, magnified: bool| {
+        let program = |estimates: u32, magnified: bool, converged: bool| {
             gpu.graphics(&GraphicsDesc {
                 vert: &shaders::FRAME_TREE_VERT,
                 frag: if plan.layers { &shaders::FRAME_TREE_LAYERS_FRAG } else { &shaders::FRAME_TREE_FRAG },
@@ -43,10 +44,18 @@ impl Trees {
                     (5, s.light_iterations),
                     (6, u32::from(plan.cascades > 0)),
                     (7, u32::from(magnified)),
+                    (8, u32::from(converged)),
                 ],
             })
         };
-        Ok(Trees { programs: [program(before, true)?, program(before, false)?, program(0, false)?] })
+        Ok(Trees {
+            programs: [
+                program(before, true, false)?,
+                program(before, false, false)?,
+                program(0, false, false)?,
+                program(0, false, true)?,
+            ],
+        })
     }
 
     /// Records the pass.

@@ -117,7 +117,6 @@ pub fn view(
     view.sky_radiance = scaled(light.sky);
     view.camera_height = eye.position[2] as f32;
     view.pixels_at_1m = eye.pixels_at_1m as f32;
-    view.fade_distance = 0.8;
     view.hotspot_amplitude = s.hotspot_amplitude;
     view.hotspot_width = s.hotspot_width;
     view.ground_contrast = s.ground_contrast;

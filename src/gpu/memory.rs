@@ -36,7 +36,7 @@ pub struct ImageDesc<'a> {
     pub usage: vk::ImageUsageFlags,
 }
 
-/// An image with one view of everything (as an array), always in `GENERAL` layout.
+/// An image with one view of everything (as an array, or a volume), always in `GENERAL` layout.
 pub struct Image {
     shared: Arc<Shared>,
     pub(super) handle: vk::Image,
@@ -44,6 +44,7 @@ pub struct Image {
     allocation: Option<Allocation>,
     format: vk::Format,
     size: [u32; 2],
+    depth: u32,
     layers: u32,
     levels: u32,
 }
@@ -135,7 +136,7 @@ impl Gpu {
     /// # Errors
     /// [`Error::Usage`] for sizes beyond the device's limits; [`Error::Device`] when out of memory.
     pub fn image(&self, d: &ImageDesc) -> Result<Image> {
-        let (s, i) = (&self.shared, self.info());
+        let i = self.info();
         if d.size.iter().any(|n| *n == 0 || *n > i.max_image_side) || d.layers == 0 || d.layers > i.max_layers
         {
             return Err(Error::Usage(format!(
@@ -143,10 +144,40 @@ impl Gpu {
                 d.name, d.size[0], d.size[1], d.layers, i.name, i.max_image_side, i.max_layers
             )));
         }
+        self.make_image(d, 1)
+    }
+
+    /// A volume of one mip level for sampling, in `GENERAL` layout, with undefined content.
+    ///
+    /// # Errors
+    /// As [`Gpu::image`].
+    pub fn volume(&self, name: &str, format: vk::Format, size: [u32; 3]) -> Result<Image> {
+        let i = self.info();
+        if size.iter().any(|n| *n == 0 || *n > i.max_volume_side) {
+            return Err(Error::Usage(format!(
+                "volume \"{name}\" of {} x {} x {}; {} takes 1 to {} texels a side",
+                size[0], size[1], size[2], i.name, i.max_volume_side
+            )));
+        }
+        let [width, height, depth] = size;
+        let usage = vk::ImageUsageFlags::empty();
+        self.make_image(
+            &ImageDesc { name, format, size: [width, height], layers: 1, levels: 1, samples: 1, usage },
+            depth,
+        )
+    }
+
+    fn make_image(&self, d: &ImageDesc, depth: u32) -> Result<Image> {
+        let s = &self.shared;
+        let (kind, view_kind) = if depth > 1 {
+            (vk::ImageType::TYPE_3D, vk::ImageViewType::TYPE_3D)
+        } else {
+            (vk::ImageType::TYPE_2D, vk::ImageViewType::TYPE_2D_ARRAY)
+        };
         let create = vk::ImageCreateInfo::default()
-            .image_type(vk::ImageType::TYPE_2D)
+            .image_type(kind)
             .format(d.format)
-            .extent(vk::Extent3D { width: d.size[0], height: d.size[1], depth: 1 })
+            .extent(vk::Extent3D { width: d.size[0], height: d.size[1], depth })
             .mip_levels(d.levels)
             .array_layers(d.layers)
             .samples(vk::SampleCountFlags::from_raw(d.samples))
@@ -160,8 +191,7 @@ impl Gpu {
                         vk::ImageUsageFlags::empty()
                     },
             );
-        let depth = d.format == vk::Format::D32_SFLOAT;
-        let aspect = if depth { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
+        let aspect = if d.format == vk::Format::D32_SFLOAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
         // SAFETY: the device is alive; on failure the handles made so far are destroyed before returning.
         let image = unsafe {
             let handle = s.device.create_image(&create, None).map_err(device_error(d.name))?;
@@ -176,7 +206,7 @@ impl Gpu {
             let bound = s.device.bind_image_memory(handle, allocation.memory(), allocation.offset());
             let view = vk::ImageViewCreateInfo::default()
                 .image(handle)
-                .view_type(vk::ImageViewType::TYPE_2D_ARRAY)
+                .view_type(view_kind)
                 .format(d.format)
                 .subresource_range(whole(aspect));
             let view = bound.and_then(|()| s.device.create_image_view(&view, None));
@@ -187,6 +217,7 @@ impl Gpu {
                 allocation: Some(allocation),
                 format: d.format,
                 size: d.size,
+                depth,
                 layers: d.layers,
                 levels: d.levels,
             };
@@ -261,6 +292,11 @@ impl Image {
     /// Width and height of level 0, texels.
     pub fn size(&self) -> [u32; 2] {
         self.size
+    }
+
+    /// Slices of a volume; 1 otherwise.
+    pub fn depth(&self) -> u32 {
+        self.depth
     }
 
     /// Array layers.

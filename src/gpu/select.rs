@@ -22,6 +22,8 @@ pub struct DeviceInfo {
     pub api: String,
     /// Largest side of a 2D image, texels.
     pub max_image_side: u32,
+    /// Largest side of a 3D image, texels.
+    pub max_volume_side: u32,
     /// Most layers of an image array.
     pub max_layers: u32,
     /// Largest storage buffer, bytes.
@@ -185,6 +187,7 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
             vk::api_version_patch(api)
         ),
         max_image_side: l.max_image_dimension2_d,
+        max_volume_side: l.max_image_dimension3_d,
         max_layers: l.max_image_array_layers,
         max_storage_bytes: l.max_storage_buffer_range as u64,
         device_bytes: memory.memory_heaps[..memory.memory_heap_count as usize]

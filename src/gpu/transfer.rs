@@ -39,7 +39,8 @@ impl Gpu {
         })
     }
 
-    /// Writes one mip level of all layers (or of `layers` from `first` on), rows tightly packed, and waits.
+    /// Writes one mip level of all layers (or of `layers` from `first` on; of a volume, all slices of its only layer), rows
+    /// tightly packed, and waits.
     ///
     /// # Errors
     /// [`Error::Device`] if the device fails.
@@ -94,7 +95,7 @@ impl Gpu {
     /// [`Error::Device`] if the device fails; [`Error::Usage`] if `T` is not a texel of the image.
     pub fn read_image<T: Pod>(&self, image: &Image, level: u32, layer: u32) -> Result<Vec<T>> {
         let [w, h] = image.size().map(|n| (n >> level).max(1) as usize);
-        let bytes = w * h * texel_bytes(image.format())?;
+        let bytes = w * h * image.depth() as usize * texel_bytes(image.format())?;
         let mut staging = self.make_buffer("read-back", bytes as u64, MemoryLocation::GpuToCpu)?;
         let region = [copy_region(image, level, layer, 1)];
         self.immediate(|device, cmd| {
@@ -154,7 +155,7 @@ fn copy_region(image: &Image, level: u32, first: u32, layers: u32) -> vk::Buffer
             base_array_layer: first,
             layer_count: layers,
         })
-        .image_extent(vk::Extent3D { width: w, height: h, depth: 1 })
+        .image_extent(vk::Extent3D { width: w, height: h, depth: image.depth() })
 }
 
 fn texel_bytes(format: vk::Format) -> Result<usize> {

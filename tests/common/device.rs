@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use canopy::bake::{BakeSettings, SpeciesBake, load_or_bake};
+use canopy::bake::{Baked, load_or_bake_scene};
 use canopy::frame::Renderer;
 use canopy::gpu::{Gpu, GpuOptions, Resource, Shader};
 use canopy::plan::Plan;
@@ -123,16 +123,15 @@ pub fn folder() -> PathBuf {
 /// A scene from text, with coarse views and small shadow maps so that it is quick to bake and draw.
 pub fn small_scene(text: &str) -> Scene {
     let quality = "\n[quality]\npreset = \"fast\"\nview_rings = 2\nview_resolution = 32\nocclusion_rays = 8\n\
-                   cascade_size = 256\ncoverage_size = 64\n";
+                   cascade_size = 256\ncoverage_size = 64\n\
+                   table_angles = 6\ntable_densities = 3\ntable_rays = 64\n";
     scene::parse(&format!("{text}{quality}"), Path::new("test.toml")).unwrap()
 }
 
 /// Species of a scene, baked once for all tests and runs.
-pub fn bake(scene: &Scene) -> Vec<Arc<SpeciesBake>> {
-    let settings: BakeSettings = (&scene.settings).into();
+pub fn bake(scene: &Scene) -> Vec<Baked> {
     let cache = folder().join("bakes");
-    let one = |s: &scene::Species| load_or_bake(&s.mesh, &s.optics, &settings, Some(&cache), true);
-    scene.species.iter().map(|s| Arc::new(one(s).unwrap().0)).collect()
+    load_or_bake_scene(scene, Some(&cache), true).unwrap().into_iter().map(|(b, _)| b).collect()
 }
 
 /// A renderer of a scene for a camera.

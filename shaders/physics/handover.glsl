@@ -1,0 +1,23 @@
+// From trees drawn one by one to the shader-map (BN12, section 7). Twin: src/physics/handover.rs, where the forms are
+// derived. `reach` is the distance over that at which a species is no longer drawn tree by tree (s / s_max).
+
+// How far light and ground have converged to their averages: nu of BN12, eq. 22-25.
+float converged(float reach) { return smoothstep(0.0, 0.8, reach); }
+
+// Share of the trees that the shader-map shows: mean of 1 - tree_fade over u.
+float handed_over(float reach) {
+    float t = clamp((reach - 0.8) * 5.0, 0.0, 1.0);
+    return t < 0.5 ? 2.0 * t * t : 1.0 - 2.0 * (1.0 - t) * (1.0 - t);
+}
+
+// Opacity factor of one tree, which fades at a time of its own, u in [0, 1).
+float tree_fade(float reach, float u) { return clamp((0.9 + 0.1 * u - reach) * 10.0, 0.0, 1.0); }
+
+// What the trees of the shader-map leave of the ground: exp(-handed over optical thickness), and where discs of single
+// trees can be told apart, only between them. Linear in the coverage, whose mean is `expected`: so is its mean right.
+float open_ground(float thickness, float over, float coverage, float expected) {
+    // Only the last of the hand-over tells discs apart: before, the trees themselves do.
+    float share = over * over;
+    float between = mix(1.0, (1.0 - coverage) / max(1.0 - expected, 1.0 / 64.0), share * share);
+    return clamp(exp(-thickness) * between, 0.0, 1.0);
+}

@@ -1,0 +1,64 @@
+//! Forest tables on the GPU (BN12, section 6): all species' pair tables in one volume, their view and ground tables in one
+//! texture array.
+
+use half::f16;
+
+use crate::bake::ForestTables;
+use crate::gpu::{Gpu, Image, ImageDesc, vk};
+use crate::{Error, Result};
+
+/// The tables of every species.
+pub struct TableData {
+    /// (W, T of leaves, T of bark): azimuth, light zenith, then view zenith within density within species.
+    pub pairs: Image,
+    /// (V, E of leaves, E of bark, coverage at visible ground) by view zenith and density, and in the last column
+    /// (D, C); a layer a species.
+    pub views: Image,
+    /// Nodes of each angle.
+    pub angles: u32,
+    /// Nodes of the density.
+    pub densities: u32,
+}
+
+impl TableData {
+    /// Uploads the tables of every species; all must have the same numbers of nodes.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when they differ; [`Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, tables: &[&ForestTables]) -> Result<Self> {
+        let (n, m) = tables.first().map_or((1, 1), |t| (t.angles, t.densities));
+        if tables.iter().any(|t| (t.angles, t.densities) != (n, m)) {
+            return Err(Error::Usage("tables of species differ in their numbers of nodes".into()));
+        }
+        let count = (tables.len() as u32).max(1);
+        // At least two slices, or it would not be a volume.
+        let pairs = gpu.volume("pair tables", vk::Format::R16G16B16A16_SFLOAT, [n, n, (count * n * m).max(2)])?;
+        let half = |v: f32| f16::from_f32(v).to_bits();
+        let mut texels: Vec<u16> = tables
+            .iter()
+            .flat_map(|t| &t.pair)
+            .flat_map(|[w, leaf, bark]| [half(*w), half(*leaf), half(*bark), 0])
+            .collect();
+        texels.resize((4 * n * n * (count * n * m).max(2)) as usize, 0);
+        gpu.upload_image(&pairs, 0, 0, 1, bytemuck::cast_slice(&texels))?;
+        let views = gpu.image(&ImageDesc {
+            name: "view tables",
+            format: vk::Format::R16G16B16A16_SFLOAT,
+            size: [n + 1, m],
+            layers: count,
+            levels: 1,
+            samples: 1,
+            usage: vk::ImageUsageFlags::empty(),
+        })?;
+        let mut texels = Vec::new();
+        for t in tables {
+            for (row, [d, c]) in t.view.chunks_exact(n as usize).zip(&t.ground) {
+                texels.extend(row.iter().flatten().map(|v| half(*v)));
+                texels.extend([half(*d), half(*c), 0, 0]);
+            }
+        }
+        texels.resize((4 * (n + 1) * m * count) as usize, 0);
+        gpu.upload_image(&views, 0, 0, count, bytemuck::cast_slice(&texels))?;
+        Ok(TableData { pairs, views, angles: n, densities: m })
+    }
+}

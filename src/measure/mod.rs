@@ -1,0 +1,3 @@
+//! What the program measures of itself. Draws through [`crate::frame`]; never touches Vulkan.
+
+pub mod reflectance;

@@ -1,0 +1,274 @@
+//! Radiance of a forest patch against view angle, sun angle and distance (BN12, figures 7 and 8).
+//!
+//! A patch is a level or inclined plane with the scene's species at the scene's mean densities. It is looked at with parallel
+//! rays, as far as a lens allows: from [`CAMERA_DISTANCES`] patch sides away. Everything in the renderer that depends
+//! on distance depends on the size of a pixel on the tree, and the texels of the shadow map; so the distance `s` is set
+//! by the pixel, s / `pixels_at_1m`, and by the texels that the scene camera's cascades have there. All distances see the
+//! same trees through the same rays, so that their ratio is much better known than either.
+
+use std::sync::Arc;
+
+use crate::bake::Baked;
+use crate::frame::Renderer;
+use crate::frame::camera::Eye;
+use crate::frame::cascades::Cascade;
+use crate::gpu::Gpu;
+use crate::plan::{Plan, Representation};
+use crate::scene::{Camera, Distribution, Raster, Scene, Terrain};
+use crate::{Error, Result};
+
+/// Distance of the camera from a patch, in sides of the patch: rays diverge by 1.2 degrees.
+const CAMERA_DISTANCES: f64 = 24.0;
+/// Side of the plane that patches lie on, m.
+const PLANE: f64 = 2400.0;
+/// Samples of the plane's height map along a side.
+const PLANE_SAMPLES: u32 = 25;
+/// Largest side of the patch's shadow map, texels.
+const LARGEST_SHADOW_MAP: f64 = 2048.0;
+
+/// What to measure.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Sun zenith angle, degrees.
+    pub sun_zenith: f64,
+    /// Inclination of the patch, degrees; it descends towards the sun where positive, away from it where negative.
+    pub slope: f64,
+    /// Distance, m.
+    pub distance: f64,
+    /// How trees are drawn.
+    pub representation: Representation,
+    /// Directions of the viewer: zenith angle, negative away from the sun, and azimuth relative to the sun, degrees.
+    pub views: Vec<[f64; 2]>,
+}
+
+/// How to measure.
+#[derive(Clone, Copy, Debug)]
+pub struct Method {
+    /// Number of patches.
+    pub patches: u32,
+    /// Side of a patch, m.
+    pub side: f64,
+    /// Pixels along a side of the image of a patch.
+    pub pixels: u32,
+}
+
+impl Default for Method {
+    fn default() -> Self {
+        Method { patches: 4, side: 150.0, pixels: 192 }
+    }
+}
+
+/// Mean over the patches, and its standard error.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Measured {
+    /// View zenith angle and relative azimuth, degrees.
+    pub view: [f64; 2],
+    /// Fractions k of lit and shadowed ground, lit and shadowed trees.
+    pub fractions: [f64; 4],
+    /// Radiance from the sun, RGB, in the scene's units.
+    pub sun: [f64; 3],
+    /// Radiance from the sky, RGB.
+    pub sky: [f64; 3],
+    /// Standard error of the radiance, RGB; zero for one patch.
+    pub stderr: [f64; 3],
+}
+
+impl Measured {
+    /// Radiance, RGB.
+    pub fn radiance(&self) -> [f64; 3] {
+        std::array::from_fn(|k| self.sun[k] + self.sky[k])
+    }
+}
+
+/// Trees per m² of every species, over the whole terrain on average.
+pub fn mean_densities(scene: &Scene) -> Vec<f64> {
+    let [width, height] = scene.terrain.extent;
+    scene
+        .species
+        .iter()
+        .map(|s| match &s.distribution {
+            Distribution::Positions(list) => list.len() as f64 / (width * height),
+            Distribution::Density { .. } => {
+                let n = 64;
+                let at = |k: usize, e: f64| e * (k as f64 + 0.5) / f64::from(n);
+                let sum: f64 = (0..(n * n) as usize)
+                    .map(|k| {
+                        let (x, y) = (at(k % n as usize, width), at(k / n as usize, height));
+                        crate::forest::density::local(&s.distribution, &scene.terrain, x, y)
+                    })
+                    .sum();
+                sum / f64::from(n * n)
+            }
+        })
+        .collect()
+}
+
+/// The scene of a patch: the species at these densities, on a plane.
+///
+/// # Errors
+/// [`Error::Usage`] when there is no tree at all.
+pub fn patch_scene(scene: &Scene, densities: &[f64], sun_zenith: f64, slope: f64) -> Result<Scene> {
+    if densities.iter().sum::<f64>() <= 0.0 {
+        return Err(Error::Usage("the scene has no trees to measure".into()));
+    }
+    let mut patch = scene.clone();
+    patch.sun.azimuth = 180.0;
+    patch.sun.elevation = 90.0 - sun_zenith;
+    let cell_size = PLANE / f64::from(PLANE_SAMPLES - 1);
+    // The sun stands in the south: ground that descends towards it rises to the north.
+    let heights = (slope != 0.0).then(|| Raster {
+        width: PLANE_SAMPLES,
+        height: PLANE_SAMPLES,
+        samples: (0..PLANE_SAMPLES * PLANE_SAMPLES)
+            .map(|k| (f64::from(k / PLANE_SAMPLES) * cell_size * slope.to_radians().tan()) as f32)
+            .collect(),
+    });
+    patch.terrain = Terrain {
+        origin: [0.0; 2],
+        extent: [PLANE; 2],
+        cell_size,
+        heights,
+        albedo: crate::scene::Albedo::Uniform(mean_albedo(&scene.terrain.albedo)),
+    };
+    for (species, density) in patch.species.iter_mut().zip(densities) {
+        let most = match &species.distribution {
+            Distribution::Density { max_density, .. } => max_density.max(*density as f32),
+            Distribution::Positions(_) => *density as f32,
+        };
+        let relative = if most > 0.0 { (*density / f64::from(most)) as f32 } else { 0.0 };
+        species.distribution = Distribution::Density {
+            // Thinned from the pattern as in the scene.
+            map: Some(Arc::new(Raster { width: 1, height: 1, samples: vec![relative] })),
+            max_density: most,
+            between_heights: None,
+            below_slope: None,
+        };
+    }
+    Ok(patch)
+}
+
+fn mean_albedo(albedo: &crate::scene::Albedo) -> [f32; 3] {
+    match albedo {
+        crate::scene::Albedo::Uniform(c) => *c,
+        crate::scene::Albedo::Image(t) => {
+            let linear = |v: u8| crate::physics::tonemap::linear(f64::from(v) / 255.0);
+            let n = (t.rgba.len() / 4) as f64;
+            std::array::from_fn(|k| (t.rgba.chunks_exact(4).map(|p| linear(p[k])).sum::<f64>() / n) as f32)
+        }
+    }
+}
+
+/// Measures one sun, slope, distance and representation for all views; `progress` is called after every image.
+///
+/// # Errors
+/// [`Error::Usage`] for angles that see no ground; [`Error::Device`] if the device fails.
+pub fn measure(
+    gpu: &Gpu,
+    scene: &Scene,
+    densities: &[f64],
+    baked: &[Baked],
+    (camera, size): (&Camera, [u32; 2]),
+    method: &Method,
+    request: &Request,
+    progress: &mut dyn FnMut(),
+) -> Result<Vec<Measured>> {
+    let mut patch = patch_scene(scene, densities, request.sun_zenith, request.slope)?;
+    let optics = Eye::new(camera, &scene.terrain, size);
+    let away = CAMERA_DISTANCES * method.side;
+    // A pixel on the tree is as large as from the distance.
+    let pixels_at_1m = optics.pixels_at_1m * away / request.distance;
+    let scene_plan = Plan::new(scene, camera, size, false, Some(gpu.info()))?;
+    let widest = request.views.iter().map(|v| v[0].abs()).fold(0.0, f64::max);
+    // What the image shows, along the ground, and the trees around whose shadows fall into it.
+    let shown = method.side * (0.5 / widest.to_radians().cos().max(0.1) + 0.1) + 2.0 * scene_plan.tallest;
+    let texel = shadow_texel(&patch, &scene_plan, &optics, request.distance).max(2.0 * shown / LARGEST_SHADOW_MAP);
+    let texels = (2.0 * shown / texel).max(64.0) as u32;
+    patch.settings.cascades = 1;
+    patch.settings.cascade_size = texels.next_power_of_two();
+    let patch = Arc::new(patch);
+    let centres = centres(method.patches, request.slope);
+    let eye = |view: [f64; 2], centre: [f64; 2]| eye(&patch.terrain, view, centre, away, method, pixels_at_1m);
+    let plan = Plan::for_eye(&patch, &eye([0.0, 0.0], centres[0]), true, request.representation, Some(gpu.info()))?;
+    let mut renderer = Renderer::new(gpu, patch.clone(), plan, baked)?;
+    let mut results = Vec::new();
+    for view in &request.views {
+        let mut samples = Vec::new();
+        for centre in &centres {
+            let eye = eye(*view, *centre);
+            let cascades = if renderer.plan().cascades > 0 {
+                vec![cascade(&patch, &eye, away, texel)]
+            } else {
+                Vec::new()
+            };
+            renderer.draw(&eye, &cascades, 1.0)?;
+            samples.push(mean(&renderer)?);
+            progress();
+        }
+        results.push(average(*view, &samples));
+    }
+    Ok(results)
+}
+
+/// Where the patches are: on a grid in the middle of the plane, in steps of more than a shadow's length.
+fn centres(count: u32, slope: f64) -> Vec<[f64; 2]> {
+    let across = (f64::from(count).sqrt().ceil() as u32).max(1);
+    // On slopes the edges of the height map bend the plane within a cell.
+    let room = PLANE - if slope == 0.0 { 1000.0 } else { 1200.0 };
+    let at = |k: u32| 0.5 * PLANE + room * ((f64::from(k) + 0.5) / f64::from(across) - 0.5);
+    (0..count).map(|k| [at(k % across), at(k / across)]).collect()
+}
+
+/// The viewer of a patch: the sun is in the south, positive zenith angles are on its side.
+fn eye(terrain: &Terrain, [zenith, azimuth]: [f64; 2], centre: [f64; 2], away: f64, m: &Method, pixels_at_1m: f64) -> Eye {
+    let (t, a) = (zenith.to_radians(), azimuth.to_radians());
+    let v = [t.sin() * a.sin(), -t.sin() * a.cos(), t.cos()];
+    let ground = crate::physics::terrain::height_at(terrain, centre[0], centre[1]);
+    let target = [centre[0], centre[1], ground];
+    let position = std::array::from_fn(|k| target[k] + away * v[k]);
+    let fov = 2.0 * (0.5 * m.side / away).atan().to_degrees();
+    let eye = Eye::looking(position, v.map(|c| -c), fov, [m.pixels; 2]);
+    Eye { pixels_at_1m, ..eye }
+}
+
+/// Metres a texel of the shadow map at a distance from the scene's camera.
+fn shadow_texel(scene: &Scene, plan: &Plan, eye: &Eye, distance: f64) -> f64 {
+    use crate::frame::shadows::Shadows;
+    let cascades = Shadows::cascades(scene, plan, eye, crate::frame::view::sun_direction(&scene.sun), eye.position[2]);
+    cascades.iter().find(|c| distance <= c.far).or(cascades.last()).map_or(1.0, |c| c.texel)
+}
+
+/// One cascade around the patch.
+fn cascade(scene: &Scene, eye: &Eye, away: f64, texel: f64) -> Cascade {
+    let half = 0.5 * texel * f64::from(scene.settings.cascade_size);
+    let target = std::array::from_fn(|k| away * eye.forward[k]);
+    Cascade::around(crate::frame::view::sun_direction(&scene.sun), eye, target, half, texel, 2.0 * away)
+}
+
+/// Mean of an image: fractions, sun and sky part.
+fn mean(renderer: &Renderer) -> Result<[f64; 10]> {
+    let picture = renderer.picture()?;
+    let linear = picture.linear.ok_or_else(|| Error::Usage("a patch is drawn with layers".into()))?;
+    let mut sum = [0.0; 10];
+    for k in 0..linear.sun.len() {
+        let all = linear.fractions[k].iter().chain(&linear.sun[k]).chain(&linear.sky[k]);
+        sum.iter_mut().zip(all).for_each(|(s, v)| *s += f64::from(*v));
+    }
+    Ok(sum.map(|s| s / linear.sun.len() as f64))
+}
+
+fn average(view: [f64; 2], samples: &[[f64; 10]]) -> Measured {
+    let n = samples.len() as f64;
+    let mean: [f64; 10] = std::array::from_fn(|k| samples.iter().map(|s| s[k]).sum::<f64>() / n);
+    let stderr = std::array::from_fn(|c| {
+        let radiance = |s: &[f64; 10]| s[4 + c] + s[7 + c];
+        let square: f64 = samples.iter().map(|s| (radiance(s) - radiance(&mean)).powi(2)).sum();
+        if n > 1.0 { (square / (n * (n - 1.0))).sqrt() } else { 0.0 }
+    });
+    Measured {
+        view,
+        fractions: [mean[0], mean[1], mean[2], mean[3]],
+        sun: [mean[4], mean[5], mean[6]],
+        sky: [mean[7], mean[8], mean[9]],
+        stderr,
+    }
+}
