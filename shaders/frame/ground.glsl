@@ -10,22 +10,9 @@ layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 3) uniform sampler2DArray slope_tiles;
 layout(binding = 4) uniform sampler2DArray albedo;
 layout(binding = 5) uniform usampler2DArray shadow_map;
-layout(binding = 6) uniform sampler2DArray coverage;
-layout(std430, binding = 7) readonly buffer Pages { uint items[]; } pages;
 layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
 
-// Coverage by trees here, and the expected coverage for the local density: (Gamma, 1 - exp(-Lambda A)), see BN12 eq. 10.
-vec2 ground_coverage() {
-    vec2 at = (view.v.quad_offset + position.xy) / view.v.quad_side;
-    vec2 quad = floor(at);
-    ivec2 q = view.v.quad_camera + ivec2(quad);
-    // Pages hold the quads around the camera; farther ones would wrap around.
-    bool held = all(lessThan(abs(quad), vec2(0.5 * float(GRID_SIDE) - 1.0)));
-    uint page = pages.items[(q.x & int(GRID_SIDE - 1u)) + int(GRID_SIDE) * (q.y & int(GRID_SIDE - 1u))];
-    if (!held || page == NO_PAGE) return vec2(0.0);
-    float side = float(textureSize(coverage, 0).x);
-    return textureLod(coverage, vec3(((at - quad) * (side - 1.0) + 0.5) / side, float(page)), 0.0).rg;
-}
+#include "frame/cover.glsl"
 
 void ground_light(out vec3 sun, out vec3 sky) {
     vec2 slope = textureLod(slope_tiles, vec3(slope_at, float(layer)), 0.0).rg;
@@ -46,11 +33,8 @@ void ground_light(out vec3 sun, out vec3 sky) {
         visible = mix(visible, 1.0, smoothstep(0.8, 1.0, distance / view.v.cascade_far[view.v.cascade_count - 1u]));
     }
     sun = reflectance * (cosine * visible / PI) * view.v.sun_irradiance;
-    // And so do the trees above.
-    vec2 cover = ground_coverage() * (1.0 - smoothstep(0.8, 1.0, distance / view.v.range));
-    // Lambda A from 1 - exp(-Lambda A); eight bits tell up to 5.5.
-    float thickness = -log(max(1.0 - cover.y, 1.0 / 256.0));
-    float open = 0.5 * (1.0 + n.z) * ground_visibility(thickness) *
-                 ground_contrast(cover.x, cover.y, view.v.ground_contrast);
+    Cover above = cover();
+    float open = 0.5 * (1.0 + n.z) * ground_visibility(above.thickness) *
+                 ground_contrast(above.coverage, above.expected, view.v.ground_contrast);
     sky = reflectance * open * view.v.sky_radiance;
 }

@@ -3,9 +3,9 @@
 use super::shadows::TerrainPush;
 use super::targets::ImageTargets;
 use crate::Result;
-use crate::forest::seeds::SeedData;
+use crate::forest::coverage::{self, CoverageData};
 use crate::forest::terrain::{TerrainData, TerrainDraws};
-use crate::gpu::interface::{GRID_SIDE, NO_PAGE, TERRAIN_CELLS, TERRAIN_HEIGHTS};
+use crate::gpu::interface::{TERRAIN_CELLS, TERRAIN_HEIGHTS};
 use crate::gpu::{
     Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler,
     Targets, shaders, vk,
@@ -17,9 +17,8 @@ pub struct Ground {
     /// Indices of a quad's mesh.
     pub indices: Buffer,
     program: Program,
-    /// Stand for coverage and pages in scenes without trees.
+    /// Stands for coverage tiles in scenes without trees.
     no_coverage: Image,
-    no_pages: Buffer,
 }
 
 impl Ground {
@@ -48,18 +47,17 @@ impl Ground {
                 samples: plan.samples,
                 depth: DepthTest::Reverse,
                 blend: Blend::Replace,
-                constants: &[],
+                constants: &[(0, plan.cover_groups), (1, (plan.coverage_size as f32).to_bits())],
             })?,
             no_coverage: gpu.image(&ImageDesc {
                 name: "no coverage",
-                format: vk::Format::R8G8B8A8_UNORM,
+                format: coverage::FORMAT,
                 size: [1; 2],
                 layers: 1,
                 levels: 1,
                 samples: 1,
                 usage: vk::ImageUsageFlags::empty(),
             })?,
-            no_pages: gpu.buffer_with("no pages", &vec![NO_PAGE; (GRID_SIDE * GRID_SIDE) as usize])?,
         })
     }
 
@@ -70,7 +68,7 @@ impl Ground {
         recorder: &mut Recorder,
         view: &Buffer,
         (terrain, draws): (&TerrainData, &TerrainDraws),
-        seeds: Option<&SeedData>,
+        cover: Option<&CoverageData>,
         shadow_map: &Image,
         targets: &ImageTargets,
         sky: Option<[f32; 3]>,
@@ -82,10 +80,9 @@ impl Ground {
             _ => sky.map(|_| [0.0; 4]),
         };
         let colors: Vec<_> =
-            targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), seeds.is_none())).collect();
-        let depth = Some(targets.depth.attachment(Some([0.0; 4]), seeds.is_none()));
-        let (coverage, pages) =
-            seeds.map_or((&self.no_coverage, &self.no_pages), |s| (&s.coverage, &s.pages));
+            targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), cover.is_none())).collect();
+        let depth = Some(targets.depth.attachment(Some([0.0; 4]), cover.is_none()));
+        let tiles = cover.map_or(&self.no_coverage, |c| &c.tiles);
         recorder.render("terrain", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
             pass.bind(
                 &self.program,
@@ -96,8 +93,7 @@ impl Ground {
                     ("slope_tiles", Resource::Texture(&terrain.slope_tiles, Sampler::Linear)),
                     ("albedo", Resource::Texture(&terrain.albedo, Sampler::Linear)),
                     ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
-                    ("coverage", Resource::Texture(coverage, Sampler::Linear)),
-                    ("pages", Resource::Buffer(pages)),
+                    ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
                 ],
             );
             pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
