@@ -9,8 +9,11 @@ const uint CULL_GROUP = 256u;         // seeds a workgroup of the cull
 const uint TERRAIN_CELLS = 32u;       // mesh cells along a side of a terrain quad
 const uint TERRAIN_HEIGHTS = 33u;     // height samples along a side of a terrain tile
 const uint TERRAIN_SLOPES = 65u;      // slope samples along a side of a terrain tile
-const uint GRID_SIDE = 128u;          // side of the toroidal page table of seed quads
-const uint NO_PAGE = 0xffffffffu;     // a seed quad without region
+const uint NO_PAGE = 0xffffffffu;     // no layer of a texture array
+const uint COVER_GUTTER = 8u;         // texels around a coverage tile's quad on each side: one of mip 3
+const uint COVER_LEVELS = 4u;         // mip levels of a coverage tile
+const uint COVER_GROUPS = 3u;         // most layers of a tile: its coverage and a channel a species, four a layer
+const uint COVER_SCRATCH = 16u;       // coverage tiles of one scratch word a texel that the scratch buffer holds
 
 // Everything of a frame that does not depend on the object drawn. World positions are relative to the camera. Bound as
 // a uniform block: arrays are of vec4 and mat4 only, so that std140 and std430 agree.
@@ -32,9 +35,7 @@ struct View {
     float pixels_at_1m;               // pixels that one metre covers at one metre
     ivec2 grid_camera;                // camera's cell of the terrain's finest grid
     vec2 grid_offset;                 // camera's position in that cell, m
-    ivec2 quad_camera;                // camera's seed quad
     vec2 quad_offset;                 // camera's position in that quad, m
-    float quad_side;                  // side of a seed quad, m
     float hotspot_amplitude;          // a1 of BN12 eq. 8
     float hotspot_width;              // a2 of BN12 eq. 8, 1/rad
     float ground_contrast;            // a3 of BN12 eq. 10
@@ -62,9 +63,10 @@ struct Species {
     float slope_softness;             // width of the smooth slope limit, as a tangent
     float crown_base;                 // height in scaled tree space under which there is only bark
     vec3 bark;                        // reflectance of bark over albedo of leaves
-    float area;                       // A: mean horizontal area of a tree, m2
+    float mean_area;                  // A: mean horizontal area of its trees, m2
     float vertical_scale;             // of the space in which its tables are, BN12 eq. 2-6
     float max_thickness;              // density times area at the tables' last density
+    float listed_density;             // listed trees per m2 where its map is 1; 0: not listed
 };
 
 // Rows of the projection of scaled tree space into one z-field view.
@@ -175,6 +177,11 @@ struct TerrainQuad {
     int spacing;                      // finest grid steps a mesh cell
     uint layer;                       // of its tiles
     vec2 morph;                       // distances at which vertices begin and end to morph to the next level, m
+    vec2 cover_offset;                // texture coordinates of its south-west corner in its coverage tile
+    float cover_scale;                // and how much of them the quad's side spans
+    uint cover_layer;                 // first layer of its coverage tile; NO_PAGE: no trees
+    float cover_disc;                 // log2 of the mean disc area in texels of that tile
+    float cover_floor;                // 1: the tile is the quad's own, and fades to its mip 1 where the quad morphs
 };
 
 // What the terrain takes.
@@ -187,11 +194,29 @@ struct TerrainParameters {
     uint has_heights;                 // 0: a level plain
 };
 
-// A coverage tile to draw.
+// A coverage tile to produce.
 struct CoverageTile {
-    vec2 offset;                      // corner of the quad whose seeds are drawn from the tile's, m
-    float side;                       // of a quad, m
-    uint layer;                       // of the tile
+    ivec2 cell;                       // height map texel of its south-west corner, gutter included
+    vec2 cell_offset;                 // and the position in that texel
+    float texel;                      // metres a texel
+    uint layer;                       // first layer
+    uint first;                       // word of the scratch buffer where its sums begin
+    uint fine;                        // sums along a texel's side; 0: no discs
+    uint step;                        // texels from one evaluated density to the next
+    uint samples;                     // densities evaluated along a texel's side, where step is 1
+};
+
+// Discs to draw: a seed quad and a tile that they reach into.
+struct CoverageSplat {
+    vec2 corner;                      // of the seed quad from the tile's south-west corner, gutter included, m
+    uint tile;                        // index of the coverage tile
+};
+
+// What producing coverage tiles takes, besides what producing seeds takes.
+struct CoverageParameters {
+    float reach;                      // radius of the largest disc, m
+    uint first_tile;                  // of this dispatch
+    uint first_splat;                 // of this dispatch
 };
 
 // What tone mapping takes.

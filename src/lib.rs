@@ -30,8 +30,8 @@
 //! | paper | module | shader | test |
 //! |---|---|---|---|
 //! | BN12 §3, terrain quadtree | [`forest::terrain`], [`forest::quadtree`], [`physics::terrain`] | `forest/terrain_tile.comp`, `physics/terrain.glsl` | `tests/gpu/ground.rs` |
-//! | BN12 §4, seeds from densities | [`forest::seeds`], [`forest::pattern`] | `forest/seeds.comp`, `forest/density.glsl` | `tests/gpu/seeds.rs` |
-//! | BN12 §4, coverage | [`forest::seeds`] | `forest/coverage.*`, `forest/expected_coverage.*` | `tests/gpu/light_on_ground.rs` |
+//! | BN12 §4, seeds from densities | [`forest::seeds`], [`forest::pattern`], [`forest::listed`] | `forest/seeds.comp`, `forest/candidate.glsl`, `forest/density.glsl` | `tests/gpu/seeds.rs` |
+//! | BN12 §4, coverage | [`forest::coverage`] | `forest/coverage*`, `frame/cover.glsl` | `tests/gpu/coverage.rs` |
 //! | BN12 §5, views of a z-field | [`bake`], [`physics::views`] | `physics/views.glsl` | `tests/views.rs`, `tests/bake.rs`, `tests/gpu/views.rs` |
 //! | BN12 §5, surface along a ray | [`physics::zfield`] | `physics/zfield.glsl` | `tests/zfield.rs`, `tests/zfield_quality.rs`, `tests/gpu/zfield.rs` |
 //! | BN12 eq. 7–12, light | [`physics::light`] | `physics/light.glsl`, `frame/tree_shade.glsl`, `frame/ground.glsl` | `tests/gpu/light.rs`, `tests/gpu/light_on_ground.rs` |

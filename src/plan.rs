@@ -2,7 +2,9 @@
 //! is allocated. What no one needs is not in the plan, and is not built.
 
 use crate::forest::pattern::Pattern;
+use crate::forest::quadtree::{MIN_REFINE, quad_count};
 use crate::forest::seeds::fullest_listed;
+use crate::forest::species::density_map_size;
 use crate::frame::camera::Eye;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
@@ -14,8 +16,12 @@ use crate::{Error, Result};
 
 /// Points of a Wang tile.
 const PATTERN_POINTS: u32 = 256;
-/// Seed quads along the range, at most: more would not fit the page table.
+/// Seed quads along the range, at most.
 const QUADS_IN_RANGE: f64 = 24.0;
+/// Side that no quad of the finest level of a plain with trees exceeds, m: their coverage tiles get fine near the camera.
+const PLAIN_SIDE: f64 = 160.0;
+/// Coverage tiles for a view whose terrain is as coarse as it may be: about thirty quads a level, eight levels.
+const COVER_SLOTS: f64 = 256.0;
 /// Storage buffers that every Vulkan device binds, when no device is known.
 const ASSUMED_STORAGE: u64 = 128 << 20;
 
@@ -113,8 +119,15 @@ pub struct Plan {
     pub tree_capacity: u32,
     /// Terrain tiles.
     pub terrain_tiles: u32,
+    /// Side that no quad of the finest level of a level plain exceeds, m.
+    #[serde(skip)]
+    pub plain_side: f64,
     /// Texels a side of a coverage tile.
     pub coverage_size: u32,
+    /// Coverage tiles.
+    pub cover_slots: u32,
+    /// Layers of a coverage tile, of four channels; 0 without trees.
+    pub cover_groups: u32,
     /// The point pattern, if any density needs it.
     #[serde(skip)]
     pub pattern: Option<Pattern>,
@@ -169,7 +182,10 @@ impl Plan {
             region_capacity: gpu::CULL_GROUP,
             tree_capacity: 1,
             terrain_tiles: if scene.terrain.heights.is_some() { 1024 } else { 1 },
+            plain_side: f64::INFINITY,
             coverage_size: s.coverage_size,
+            cover_slots: 0,
+            cover_groups: 0,
             pattern: None,
         };
         if scene.species.len() > gpu::MAX_SPECIES as usize {
@@ -180,6 +196,9 @@ impl Plan {
             )));
         }
         plan.trees(scene, eye, device);
+        if plan.range > 0.0 {
+            plan.coverage(scene, eye, device);
+        }
         let diagonal = scene.terrain.extent[0].hypot(scene.terrain.extent[1]);
         plan.shadow_distance = match f64::from(s.shadow_distance) {
             // Farther out the average light includes its shadows.
@@ -231,9 +250,11 @@ impl Plan {
             self.range = 0.0;
             return;
         }
-        let corner = |k: usize| eye.position[k].abs().max((scene.terrain.extent[k] - eye.position[k]).abs());
-        let farthest = corner(0).hypot(corner(1)).hypot(eye.position[2]);
-        let reach = self.range.min(farthest);
+        // Trees are no farther than the terrain, seen from here or from anywhere on it.
+        let extent = scene.terrain.extent;
+        let farthest = [0, 1].map(|k| eye.position[k].abs().max((eye.position[k] - extent[k]).abs()));
+        let farthest = farthest[0].hypot(farthest[1]).hypot(eye.position[2]);
+        let reach = self.range.min(farthest.max(extent[0].hypot(extent[1])));
         if self.pattern_density > 0.0 {
             let pattern = Pattern::new(PATTERN_POINTS, scene.seed);
             self.tile_side = (pattern.mean_points() / self.pattern_density).sqrt();
@@ -251,19 +272,42 @@ impl Plan {
         }
         self.region_capacity =
             (self.region_capacity + fullest_listed(scene, self.quad_side)).next_multiple_of(gpu::CULL_GROUP);
-        // Every quad within range, and a ring around them whose discs reach in; no more than exist or can be bound.
+        // Every quad within range; no more than exist or can be bound.
         let storage = device.map_or(ASSUMED_STORAGE, |d| d.max_storage_bytes.min(1 << 30));
         let across = |k: usize| {
             let exist = (scene.terrain.extent[k] / self.quad_side).ceil().max(1.0);
-            (2.0 * ((reach + self.tallest) / self.quad_side + 2.0).ceil() + 1.0).min(exist)
+            (2.0 * ((reach + self.tallest) / self.quad_side + 1.0).ceil() + 1.0).min(exist)
         };
         let region_bytes = u64::from(self.region_capacity) * size_of::<gpu::Seed>() as u64;
-        let most = (storage / region_bytes).min(device.map_or(2048, |d| d.max_layers).into()).max(1);
+        let most = (storage / region_bytes).max(1);
         self.seed_regions = (across(0) * across(1)).min(most as f64) as u32;
         let slots = u64::from(self.seed_regions) * u64::from(self.region_capacity);
         self.tree_capacity =
             u64::from(s.zfield_max_trees).min(slots).min(storage / size_of::<gpu::Tree>() as u64).max(1)
                 as u32;
+    }
+
+    /// Coverage tiles: how many, for a view at the terrain's level of detail.
+    fn coverage(&mut self, scene: &Scene, eye: &Eye, device: Option<&DeviceInfo>) {
+        let s = &scene.settings;
+        self.cover_groups = (1 + scene.species.len() as u32).div_ceil(4);
+        if scene.terrain.heights.is_none() {
+            self.plain_side = PLAIN_SIDE;
+            self.terrain_tiles = quad_count(&scene.terrain, PLAIN_SIDE).min(1024) as u32;
+        }
+        // The number of quads in view grows with the square of the distance to which a level is refined.
+        let cells = f64::from(gpu::TERRAIN_CELLS) * f64::from(s.terrain_pixels);
+        let refine = (eye.pixels_at_1m / cells).max(MIN_REFINE) / MIN_REFINE;
+        let wanted = (COVER_SLOTS * refine * refine).min(f64::from(self.terrain_tiles)) as u64;
+        let room = (u64::from(s.memory_mib) << 20) / 4 / self.cover_tile_bytes();
+        let layers = device.map_or(2048, |d| d.max_layers) / self.cover_groups;
+        let most = wanted.min(quad_count(&scene.terrain, self.plain_side)).min(room).min(layers.into());
+        self.cover_slots = most.max(1) as u32;
+    }
+
+    /// Bytes of a coverage tile with its mip levels.
+    fn cover_tile_bytes(&self) -> u64 {
+        u64::from(self.cover_groups) * u64::from(self.coverage_size).pow(2) * 8 * 85 / 64
     }
 
     /// Writes down every item.
@@ -303,18 +347,13 @@ impl Plan {
                 let reason = format!("species \"{}\" is drawn tree by tree", species.name);
                 add("data", &format!("z-field views of {}", species.name), reason, views);
             }
-            let maps: Vec<_> = scene
-                .species
-                .iter()
-                .filter_map(|s| match &s.distribution {
-                    Distribution::Density { map: Some(m), .. } => Some(m),
-                    _ => None,
-                })
-                .collect();
+            let maps: Vec<[u32; 2]> =
+                scene.species.iter().filter_map(|s| density_map_size(s, scene.terrain.extent)).collect();
             if !maps.is_empty() {
-                let side = |f: fn(&crate::scene::Raster) -> u32| maps.iter().map(|m| f(m)).max().unwrap_or(1);
-                let bytes = size_of_raster(side(|m| m.width), side(|m| m.height)) * maps.len() as u64;
-                add("data", "density maps", format!("{} species have a density map", maps.len()), bytes);
+                let side = |k: usize| maps.iter().map(|m| m[k]).max().unwrap_or(1);
+                let bytes = size_of_raster(side(0), side(1)) * maps.len() as u64;
+                let reason = format!("{} species have a density map or a list of trees", maps.len());
+                add("data", "density maps", reason, bytes);
             }
             if self.pattern.is_some() {
                 let reason = "densities thin a Poisson-disk pattern".to_string();
@@ -330,8 +369,15 @@ impl Plan {
             add(
                 "cache",
                 "coverage tiles",
-                "the ground is darker under trees".into(),
-                u64::from(self.seed_regions) * u64::from(self.coverage_size).pow(2) * 4,
+                format!("what trees cover of {} quads of terrain, to the horizon", self.cover_slots),
+                u64::from(self.cover_slots) * self.cover_tile_bytes(),
+            );
+            let texels = u64::from(self.coverage_size).pow(2);
+            add(
+                "data",
+                "coverage sums",
+                format!("{} coverage tiles are drawn at once", gpu::COVER_SCRATCH),
+                u64::from(gpu::COVER_SCRATCH) * texels * 4,
             );
             let capacity = u64::from(self.tree_capacity);
             add(
@@ -366,7 +412,7 @@ impl Plan {
         pass("terrain tiles", "new quads of terrain");
         if trees {
             pass("seeds", "new quads of trees");
-            pass("coverage tiles", "new quads of trees");
+            pass("coverage tiles", "new quads of terrain with trees");
             for name in ["cull", "prefix sums", "draw commands", "compact"] {
                 pass(name, "which trees are seen, in order");
             }

@@ -50,7 +50,7 @@ uint lookup(vec3 w, out vec2 weights) {
 void average_light(inout Tree t, Species kind, vec3 to_camera, vec3 ground, float density, float nu) {
     TableAngles a = table_angles(to_camera, view.v.sun_direction, ground, kind.vertical_scale);
     vec3 at = table_coordinates(a, TABLE_ANGLES);
-    float x = table_density(density * kind.area * a.up, kind.max_thickness, TABLE_DENSITIES);
+    float x = table_density(density * kind.mean_area * a.up, kind.max_thickness, TABLE_DENSITIES);
     vec4 sky = table_view(view_table, at.z, x, float(t.species), TABLE_ANGLES, TABLE_DENSITIES);
     vec3 sun = table_pair(pair_table, at, x, float(t.species), TABLE_ANGLES, TABLE_DENSITIES);
     t.own = 1.0 - nu;

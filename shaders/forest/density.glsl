@@ -13,11 +13,22 @@ float density_map(Species s, vec2 position, vec2 extent) {
     return mix(mix(d00, d10, f.x), mix(d01, d11, f.x), f.y);
 }
 
-// Trees per m2 of horizontal ground; slope is the tangent of the ground's inclination.
-float local_density(Species s, vec2 position, vec2 extent, float height, float slope) {
+// Share of its density that a species has at this height and slope, the tangent of the ground's inclination.
+float density_limits(Species s, float height, float slope) {
     vec2 lo = s.between_heights.x + s.height_softness * vec2(-1.0, 1.0);
     vec2 hi = s.between_heights.y + s.height_softness * vec2(-1.0, 1.0);
     float t = s.below_slope;
-    return s.max_density * density_map(s, position, extent) * smoothstep(lo.x, lo.y, height) *
-           (1.0 - smoothstep(hi.x, hi.y, height)) * (1.0 - smoothstep(t - s.slope_softness, t + s.slope_softness, slope));
+    return smoothstep(lo.x, lo.y, height) * (1.0 - smoothstep(hi.x, hi.y, height)) *
+           (1.0 - smoothstep(t - s.slope_softness, t + s.slope_softness, slope));
+}
+
+// Trees per m2 of horizontal ground that the species' density asks for; none of a listed species.
+float local_density(Species s, vec2 position, vec2 extent, float height, float slope) {
+    return s.max_density * density_map(s, position, extent) * density_limits(s, height, slope);
+}
+
+// The same with the listed trees, as a density.
+float horizontal_density(Species s, vec2 position, vec2 extent, float height, float slope) {
+    float wanted = s.max_density * density_limits(s, height, slope);
+    return (wanted + s.listed_density) * density_map(s, position, extent);
 }

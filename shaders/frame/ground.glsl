@@ -10,29 +10,10 @@ layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 3) uniform sampler2DArray slope_tiles;
 layout(binding = 4) uniform sampler2DArray albedo;
 layout(binding = 5) uniform usampler2DArray shadow_map;
-layout(binding = 6) uniform sampler2DArray coverage;
-layout(std430, binding = 7) readonly buffer Pages { uint items[]; } pages;
 layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
 
+#include "frame/cover.glsl"
 #include "frame/shader_map.glsl"
-
-struct Cover { float coverage; float thickness[MAX_SPECIES]; };
-Cover ground_cover() {
-    Cover c;
-    vec2 at = (view.v.quad_offset + position.xy) / view.v.quad_side;
-    vec2 quad = floor(at);
-    ivec2 q = view.v.quad_camera + ivec2(quad);
-    bool held = all(lessThan(abs(quad), vec2(0.5 * float(GRID_SIDE) - 1.0)));
-    uint page = pages.items[(q.x & int(GRID_SIDE - 1u)) + int(GRID_SIDE) * (q.y & int(GRID_SIDE - 1u))];
-    for (int k = 0; k < MAX_SPECIES; k++) c.thickness[k] = 0.0;
-    c.coverage = 0.0;
-    if (!held || page == NO_PAGE) return c;
-    float side = float(textureSize(coverage, 0).x);
-    vec2 t = textureLod(coverage, vec3(((at - quad) * (side - 1.0) + 0.5) / side, float(page)), 0.0).rg;
-    c.coverage = t.x;
-    c.thickness[0] = -log(max(1.0 - t.y, 1.0 / 256.0));
-    return c;
-}
 
 struct GroundLight {
     vec3 sun, sky;  // parts of the radiance
@@ -60,12 +41,13 @@ GroundLight ground_light() {
     vec3 reflectance = textureLod(albedo, vec3(world.x, 1.0 - world.y, 0.0), 0.0).rgb;
     float distance = length(position);
     float cosine = max(dot(n, view.v.sun_direction), 0.0);
-    Cover cover = ground_cover();
-    ForestPixel f = shader_map(position * (-1.0 / max(distance, 1e-6)), n, distance, cover.thickness);
+    Cover c = cover();
+    ForestPixel f = shader_map(position * (-1.0 / max(distance, 1e-6)), n, distance, c);
+    float coverage = mix(f.expected, c.channels[0].x, c.resolved);
     float lit = HAS_SUN ? mix(shadow_maps(n, cosine, distance), f.ground_lit, f.converged) : 0.0;
-    float contrast = mix(ground_contrast(cover.coverage, f.expected, view.v.ground_contrast),
+    float contrast = mix(ground_contrast(coverage, f.expected, view.v.ground_contrast),
                          ground_contrast(f.seen_coverage, f.expected, view.v.ground_contrast), f.converged);
-    float open = open_ground(f.over, f.share, cover.coverage, f.expected);
+    float open = open_ground(f.over, f.share, coverage, f.expected);
     GroundLight g;
     vec3 sun = reflectance * (cosine * lit / PI) * view.v.sun_irradiance;
     vec3 sky = reflectance * (0.5 * (1.0 + n.z) * f.sky * contrast) * view.v.sky_radiance;

@@ -10,10 +10,10 @@
 layout(binding = 8) uniform sampler3D pair_table;
 layout(binding = 9) uniform sampler2DArray view_table;
 layout(std430, binding = 10) readonly buffer SpeciesTable { Species items[]; } species;
-layout(constant_id = 0) const uint SPECIES_COUNT = 0u;
-layout(constant_id = 1) const float TABLE_ANGLES = 16.0;
-layout(constant_id = 2) const float TABLE_DENSITIES = 8.0;
-layout(constant_id = 3) const bool HAS_SUN = true;
+layout(constant_id = 2) const uint SPECIES_COUNT = 0u;
+layout(constant_id = 3) const float TABLE_ANGLES = 16.0;
+layout(constant_id = 4) const float TABLE_DENSITIES = 8.0;
+layout(constant_id = 5) const bool HAS_SUN = true;
 
 struct ForestPixel {
     float over;          // optical thickness of the trees that the shader-map shows
@@ -27,21 +27,21 @@ struct ForestPixel {
     vec3 tree_sun, tree_sky; // radiance of the trees
 };
 
-ForestPixel shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIES]) {
+ForestPixel shader_map(vec3 v, vec3 n, float distance, Cover c) {
     ForestPixel f = ForestPixel(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, vec3(0.0), vec3(0.0));
     float density = 0.0;
-    for (uint k = 0u; k < SPECIES_COUNT; k++) density += thickness[k] / species.items[k].area;
+    for (uint k = 0u; k < SPECIES_COUNT; k++) density += species_thickness(c, k) / species.items[k].mean_area;
     if (density <= 0.0) return f;
     float seen = 0.0, joint = 0.0, log_sky = 0.0, log_gap = 0.0;
     for (uint k = 0u; k < SPECIES_COUNT; k++) {
         Species s = species.items[k];
-        float share = thickness[k] / (s.area * density);
+        float share = species_thickness(c, k) / (s.mean_area * density);
         TableAngles a = table_angles(v, view.v.sun_direction, n, s.vertical_scale);
-        float x = density * s.area * a.up;
+        float x = density * s.mean_area * a.up;
         float at_x = table_density(x, s.max_thickness, TABLE_DENSITIES);
         vec3 at = table_coordinates(a, TABLE_ANGLES);
         vec4 t = table_view(view_table, at.z, at_x, float(k), TABLE_ANGLES, TABLE_DENSITIES);
-        vec2 g = table_ground(view_table, table_density(density * s.area, s.max_thickness, TABLE_DENSITIES), float(k),
+        vec2 g = table_ground(view_table, table_density(density * s.mean_area, s.max_thickness, TABLE_DENSITIES), float(k),
                               TABLE_ANGLES, TABLE_DENSITIES);
         float l = share * x * a.sec_v * t.x, reach = distance / s.range, part = l * handed_over(reach);
         seen += l;

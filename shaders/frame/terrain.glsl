@@ -6,19 +6,25 @@ layout(std430, binding = 1) readonly buffer Quads { TerrainQuad items[]; } quads
 layout(binding = 2) uniform sampler2DArray height_tiles;
 layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
 
+// Place on the finest grid of a vertex of a quad; the terrain ends at its last sample.
+vec2 grid_place(TerrainQuad q, ivec2 at) { return min(vec2(q.corner + at * q.spacing), p.last); }
+
 vec3 grid_position(TerrainQuad q, ivec2 at) {
     float height = texelFetch(height_tiles, ivec3(at, q.layer), 0).r;
-    vec2 grid = min(vec2(q.corner + at * q.spacing), p.last);
+    vec2 grid = grid_place(q, at);
     // Relative to the camera's cell first: exact, whatever the distance from the corner of the terrain.
     return vec3((grid - vec2(view.v.grid_camera)) * p.step - view.v.grid_offset, height - view.v.camera_height);
 }
 
-// Position from the camera, and position in the quad in [0, 1].
-vec3 terrain_vertex(TerrainQuad q, uint vertex, out vec2 within) {
-    ivec2 at = ivec2(vertex % TERRAIN_HEIGHTS, vertex / TERRAIN_HEIGHTS);
+// Position from the camera; position in the quad's tiles in [0, 1]; and (xy) position in its square of ground, in [0, 1],
+// from which the former differs beyond the end of the terrain, with (z) how far it has morphed to the coarser grid.
+vec3 terrain_vertex(TerrainQuad q, uint vertex, out vec2 within, out vec3 place) {
+    ivec2 at = ivec2(vertex % TERRAIN_HEIGHTS, vertex / TERRAIN_HEIGHTS), even = at - (at & 1);
     vec3 fine = grid_position(q, at);
     float morph = smoothstep(q.morph.x, q.morph.y, length(fine));
-    vec3 coarse = grid_position(q, at - (at & 1));
-    within = mix(vec2(at), vec2(at - (at & 1)), morph) / float(TERRAIN_CELLS);
+    vec3 coarse = grid_position(q, even);
+    within = mix(vec2(at), vec2(even), morph) / float(TERRAIN_CELLS);
+    vec2 grid = mix(grid_place(q, at), grid_place(q, even), morph) - vec2(q.corner);
+    place = vec3(grid / float(q.spacing * int(TERRAIN_CELLS)), morph);
     return fine * (1.0 - morph) + coarse * morph;
 }

@@ -9,7 +9,8 @@ layout(location = 0) out float depth;
 
 void main() {
     vec2 within;
-    vec3 position = terrain_vertex(quads.items[p.first_quad + gl_InstanceIndex], gl_VertexIndex, within);
+    vec3 place;
+    vec3 position = terrain_vertex(quads.items[p.first_quad + gl_InstanceIndex], gl_VertexIndex, within, place);
     vec4 at = view.v.cascade_from_world[cascade] * vec4(position, 1.0);
     // Ground before the cascade's near side casts from there.
     at.z = min(at.z, 1.0);

@@ -21,6 +21,14 @@ pub struct QuadKey {
     pub y: u32,
 }
 
+impl QuadKey {
+    /// The quad itself, or its ancestor at this level where it is deeper.
+    pub fn ancestor(self, level: u32) -> QuadKey {
+        let up = self.level.saturating_sub(level);
+        QuadKey { level: self.level - up, x: self.x >> up, y: self.y >> up }
+    }
+}
+
 /// An axis-aligned box in world coordinates, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
@@ -58,17 +66,10 @@ pub struct Quadtree {
 }
 
 impl Quadtree {
-    /// The tree for a terrain: its finest mesh cells are an eighth of a height map cell.
-    pub fn new(terrain: &Terrain) -> Self {
-        let largest = terrain.extent[0].max(terrain.extent[1]);
-        let cells = f64::from(crate::gpu::interface::TERRAIN_CELLS);
-        let (mut step, mut levels) = (largest / cells, 1);
-        if terrain.heights.is_some() {
-            step = terrain.cell_size / 8.0;
-            while step * cells * f64::from(1u32 << (levels - 1)) < largest {
-                levels += 1;
-            }
-        }
+    /// The tree for a terrain. With relief, its finest mesh cells are an eighth of a height map cell; a level plain has
+    /// quads down to a side of `plain_side` metres.
+    pub fn new(terrain: &Terrain, plain_side: f64) -> Self {
+        let (step, levels) = levels(terrain, plain_side);
         Quadtree {
             extent: terrain.extent,
             step,
@@ -177,6 +178,34 @@ impl Quadtree {
     }
 }
 
+/// Metres a step of the finest grid, and the number of levels.
+fn levels(terrain: &Terrain, plain_side: f64) -> (f64, u32) {
+    let largest = terrain.extent[0].max(terrain.extent[1]);
+    let cells = f64::from(crate::gpu::interface::TERRAIN_CELLS);
+    let mut levels = 1;
+    if terrain.heights.is_some() {
+        let step = terrain.cell_size / 8.0;
+        while step * cells * f64::from(1u32 << (levels - 1)) < largest {
+            levels += 1;
+        }
+        return (step, levels);
+    }
+    // The root is the whole plain.
+    while largest / f64::from(1u32 << (levels - 1)) > plain_side && levels < 20 {
+        levels += 1;
+    }
+    (largest / (cells * f64::from(1u32 << (levels - 1))), levels)
+}
+
+/// Number of quads of all levels of a terrain's tree that [`Quadtree::new`] would make.
+pub fn quad_count(terrain: &Terrain, plain_side: f64) -> u64 {
+    let (step, levels) = levels(terrain, plain_side);
+    let finest = step * f64::from(crate::gpu::interface::TERRAIN_CELLS);
+    let along =
+        |extent: f64, level: u32| (extent / (finest * f64::from(1u32 << level))).ceil().max(1.0) as u64;
+    (0..levels).map(|l| along(terrain.extent[0], l) * along(terrain.extent[1], l)).sum()
+}
+
 fn min_max_pyramid(raster: &Raster) -> Vec<(u32, u32, Vec<[f32; 2]>)> {
     let mut levels =
         vec![(raster.width, raster.height, raster.samples.iter().map(|s| [*s, *s]).collect::<Vec<_>>())];
@@ -227,7 +256,7 @@ mod tests {
     #[test]
     fn quads_tile_the_terrain_and_neighbours_differ_by_one_level_at_most() {
         let terrain = hills();
-        let tree = Quadtree::new(&terrain);
+        let tree = Quadtree::new(&terrain, f64::INFINITY);
         for eye in [[2000.0, 1500.0, 100.0], [-500.0, 0.0, 300.0], [2560.0, 1960.0, 5000.0]] {
             let quads = tree.select(eye, MIN_REFINE, 100_000, &|_| true).unwrap();
             let mut area = 0.0;
@@ -255,7 +284,7 @@ mod tests {
     #[test]
     fn bounds_hold_the_interpolated_ground() {
         let terrain = hills();
-        let tree = Quadtree::new(&terrain);
+        let tree = Quadtree::new(&terrain, f64::INFINITY);
         for k in 0..400 {
             let low = [f64::from(k % 20) * 230.0, f64::from(k / 20) * 180.0];
             let high = [low[0] + 97.0, low[1] + 143.0];

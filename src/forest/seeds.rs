@@ -1,4 +1,4 @@
-//! Tree seeds: which quads of ground have them, where in the seed buffer, and their coverage tiles.
+//! Tree seeds: which quads of ground have them, and where in the seed buffer.
 
 use std::collections::HashMap;
 
@@ -7,26 +7,13 @@ use super::quadtree::{Bounds, Quadtree};
 use super::species::SpeciesData;
 use super::terrain::TerrainData;
 use crate::frame::camera::Eye;
-use crate::gpu::interface::{
-    CoverageTile, DrawCommand, GRID_SIDE, ListedTree, NO_PAGE, Seed, SeedParameters, SeedQuad,
-};
-use crate::gpu::{
-    Attachment, Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource,
-    Sampler, Targets, shaders, vk,
-};
+use crate::gpu::interface::{DrawCommand, ListedTree, Seed, SeedParameters, SeedQuad};
+use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
 use crate::plan::Plan;
 use crate::scene::{Distribution, Scene};
 use crate::{Error, Result};
 
-/// Both push constants of an expected-coverage draw.
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct ExpectedCoverage {
-    parameters: SeedParameters,
-    tile: CoverageTile,
-}
-
-/// Seeds and coverage of the quads near the camera.
+/// Seeds of the quads near the camera.
 pub struct SeedData {
     /// Seeds, region after region.
     pub seeds: Buffer,
@@ -40,26 +27,21 @@ pub struct SeedData {
     pub visible: u32,
     /// Seeds a region.
     pub region_capacity: u32,
-    /// Coverage by trees, one layer a region.
-    pub coverage: Image,
-    /// Page table: region of the quads around the camera, toroidal.
-    pub pages: Buffer,
     /// Indices of a quad a tree: 0, 1, 2, 2, 1, 3, and so on.
     pub quad_indices: Buffer,
-    pattern: Buffer,
-    listed: Buffer,
-    species_count: Buffer,
-    listed_ranges: HashMap<(i32, i32), (u32, u32)>,
+    pub(super) pattern: Buffer,
+    pub(super) listed: Buffer,
+    pub(super) species_count: Buffer,
+    pub(super) parameters: SeedParameters,
+    /// Quads along the terrain's sides.
+    pub(super) quad_count: [i32; 2],
+    /// Side of a quad, m.
+    pub(super) side: f64,
+    listed_ranges: ListedRanges,
     cache: SlotCache<(i32, i32)>,
-    covered: Vec<Option<(i32, i32)>>,
-    programs: (Program, Program, Program),
-    parameters: SeedParameters,
-    quad_count: [i32; 2],
+    program: Program,
     top: f64,
 }
-
-/// A coverage tile to draw: its quad, its region, and the regions around it with the offset of their quads.
-type TileWork = (u32, u32, Vec<(u32, [f64; 2])>);
 
 /// First and number of the listed trees of a quad.
 type ListedRanges = HashMap<(i32, i32), (u32, u32)>;
@@ -69,9 +51,6 @@ type ListedRanges = HashMap<(i32, i32), (u32, u32)>;
 pub struct SeedWork {
     /// First and number of quads whose seeds are to be produced, in [`SeedData::quads`].
     pub fresh: (u32, u32),
-    /// Coverage tiles to draw: the quad's index in [`SeedData::quads`], its region, and the regions around it with the
-    /// offset of their quads.
-    tiles: Vec<TileWork>,
 }
 
 impl SeedData {
@@ -86,18 +65,6 @@ impl SeedData {
             .flat_map(|k| [0, 1, 2, 2, 1, 3].map(|c| 4 * k + c))
             .collect();
         let pattern = plan.pattern.as_ref().map_or_else(Vec::new, |p| p.packed());
-        let side = [(0, (plan.coverage_size as f32).to_bits()), (1, scene.species.len() as u32)];
-        let coverage_program = |vert, frag, blend, constants| {
-            gpu.graphics(&GraphicsDesc {
-                vert,
-                frag,
-                colors: &[vk::Format::R8G8B8A8_UNORM],
-                samples: 1,
-                depth: DepthTest::None,
-                blend,
-                constants,
-            })
-        };
         let heights = scene.terrain.heights.is_some();
         Ok(SeedData {
             seeds: gpu.buffer("seeds", slots * size_of::<Seed>() as u64)?,
@@ -108,38 +75,13 @@ impl SeedData {
             visible_quads: Vec::new(),
             visible: 0,
             region_capacity: plan.region_capacity,
-            coverage: gpu.image(&ImageDesc {
-                name: "coverage tiles",
-                format: vk::Format::R8G8B8A8_UNORM,
-                size: [plan.coverage_size; 2],
-                layers: plan.seed_regions,
-                levels: 1,
-                samples: 1,
-                usage: vk::ImageUsageFlags::COLOR_ATTACHMENT,
-            })?,
-            pages: gpu.buffer_with("seed pages", &vec![NO_PAGE; (GRID_SIDE * GRID_SIDE) as usize])?,
             quad_indices: gpu.buffer_with("quad indices", &indices)?,
             pattern: gpu.buffer_with("point pattern", &pattern)?,
             listed: gpu.buffer_with("listed trees", &listed)?,
             species_count: gpu.buffer_with("species count", &[scene.species.len() as u32])?,
             listed_ranges,
             cache: SlotCache::new(plan.seed_regions),
-            covered: vec![None; plan.seed_regions as usize],
-            programs: (
-                gpu.compute(&shaders::FOREST_SEEDS_COMP, &[])?,
-                coverage_program(
-                    &shaders::FOREST_EXPECTED_COVERAGE_VERT,
-                    &shaders::FOREST_EXPECTED_COVERAGE_FRAG,
-                    Blend::Replace,
-                    &side,
-                )?,
-                coverage_program(
-                    &shaders::FOREST_COVERAGE_VERT,
-                    &shaders::FOREST_COVERAGE_FRAG,
-                    Blend::Union,
-                    &side[..1],
-                )?,
-            ),
+            program: gpu.compute(&shaders::FOREST_SEEDS_COMP, &[])?,
             parameters: SeedParameters {
                 extent: scene.terrain.extent.map(|e| e as f32),
                 quad_side: plan.quad_side as f32,
@@ -154,6 +96,7 @@ impl SeedData {
                 has_heights: u32::from(heights),
             },
             quad_count: scene.terrain.extent.map(|e| (e / plan.quad_side).ceil().max(1.0) as i32),
+            side: plan.quad_side,
             top: plan.tallest,
         })
     }
@@ -180,63 +123,27 @@ impl SeedData {
         self.cache.begin_frame();
         self.visible = 0;
         self.visible_quads.clear();
-        let mut work = SeedWork::default();
         let visible = if range > 0.0 { self.select(tree, eye, range, reach) } else { Vec::new() };
-        let (mut fresh, mut regions) = (Vec::new(), Vec::new());
-        let mut take = |this: &mut Self, quad: (i32, i32)| -> Result<u32> {
-            let slot = this.cache.slot(quad).ok_or_else(|| {
+        let mut fresh = Vec::new();
+        for quad in &visible {
+            let slot = self.cache.slot(*quad).ok_or_else(|| {
                 Error::Usage(format!(
                     "this view needs more than the {} seed quads of the plan: raise zfield_min_pixels or memory_mib",
-                    this.cache.capacity()
+                    self.cache.capacity()
                 ))
             })?;
+            let seeds =
+                SeedQuad { corner: self.beside_camera(*quad, eye), ..self.seed_quad(*quad, slot.index) };
+            self.visible_quads.push(seeds);
             if slot.fresh {
-                this.covered[slot.index as usize] = None;
-                fresh.push(this.seed_quad(quad, slot.index, eye));
+                fresh.push(seeds);
             }
-            Ok(slot.index)
-        };
-        for quad in &visible {
-            regions.push(take(self, *quad)?);
-        }
-        // Discs of neighbours reach into a tile: their seeds must be there before it is drawn.
-        let mut tiles = Vec::new();
-        for (k, &(x, y)) in visible.iter().enumerate() {
-            if self.covered[regions[k] as usize] == Some((x, y)) {
-                continue;
-            }
-            let mut around = Vec::new();
-            for (dx, dy) in [(0, 0), (-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
-                let quad = (x + dx, y + dy);
-                if self.exists(quad) {
-                    let side = f64::from(self.parameters.quad_side);
-                    around.push((take(self, quad)?, [f64::from(dx) * side, f64::from(dy) * side]));
-                }
-            }
-            tiles.push((regions[k], (x, y), around));
-        }
-        let mut pages = vec![NO_PAGE; (GRID_SIDE * GRID_SIDE) as usize];
-        let mask = GRID_SIDE as i32 - 1;
-        for (&(x, y), &region) in visible.iter().zip(&regions) {
-            pages[((x & mask) + (y & mask) * GRID_SIDE as i32) as usize] = region;
-            self.visible_quads.push(self.seed_quad((x, y), region, eye));
         }
         self.visible = visible.len() as u32;
-        let mut all = self.visible_quads.clone();
-        work.fresh = (all.len() as u32, fresh.len() as u32);
-        all.extend(&fresh);
-        for (region, quad, around) in tiles {
-            let index = visible.iter().position(|q| *q == quad).unwrap_or(0) as u32;
-            self.covered[region as usize] = Some(quad);
-            work.tiles.push((index, region, around));
-        }
-        gpu.upload(&self.quads, 0, &all)?;
-        gpu.upload(&self.pages, 0, &pages)?;
+        let work = SeedWork { fresh: (self.visible, fresh.len() as u32) };
+        gpu.upload(&self.quads, 0, &self.visible_quads)?;
+        gpu.upload(&self.quads, u64::from(self.visible) * size_of::<SeedQuad>() as u64, &fresh)?;
         Ok(work)
-    }
-
-    fn exists(&self, (x, y): (i32, i32)) -> bool {
-        (0..self.quad_count[0]).contains(&x) && (0..self.quad_count[1]).contains(&y)
     }
 
     /// Quads within `range` whose trees, or the trees' shadows (`reach` long, away from the sun), may be in view.
@@ -272,18 +179,23 @@ impl SeedData {
         found
     }
 
-    fn seed_quad(&self, (x, y): (i32, i32), region: u32, eye: &Eye) -> SeedQuad {
+    /// South-west corner of a quad from the camera's quad, m.
+    fn beside_camera(&self, (x, y): (i32, i32), eye: &Eye) -> [f32; 2] {
+        let (camera, _) = self.camera_quad(eye);
+        [x - camera[0], y - camera[1]].map(|v| (f64::from(v) * f64::from(self.parameters.quad_side)) as f32)
+    }
+
+    /// A quad as shaders take it to find its trees.
+    pub(super) fn seed_quad(&self, (x, y): (i32, i32), region: u32) -> SeedQuad {
         let p = &self.parameters;
         let (side, cell) = (f64::from(p.quad_side), f64::from(p.cell_size));
         let corner = [f64::from(x) * side, f64::from(y) * side];
         let texel = corner.map(|c| (c / cell).floor());
-        let (camera, _) = self.camera_quad(eye);
         let (first, count) = self.listed_ranges.get(&(x, y)).copied().unwrap_or((0, 0));
         SeedQuad {
             tile: [x, y].map(|v| v * p.tiles_per_side as i32),
             texel: texel.map(|t| t as i32),
             texel_offset: [0, 1].map(|k| (corner[k] / cell - texel[k]) as f32),
-            corner: [f64::from(x - camera[0]) * side, f64::from(y - camera[1]) * side].map(|v| v as f32),
             region,
             first_position: first,
             position_count: count,
@@ -291,7 +203,7 @@ impl SeedData {
         }
     }
 
-    /// Records the production of fresh seeds and coverage tiles.
+    /// Records the production of fresh seeds.
     pub fn produce(
         &self,
         recorder: &mut Recorder,
@@ -299,59 +211,26 @@ impl SeedData {
         terrain: &TerrainData,
         species: &SpeciesData,
     ) {
-        if work.fresh.1 > 0 {
-            recorder.compute("seeds", |pass| {
-                pass.bind(
-                    &self.programs.0,
-                    &[
-                        ("quads", Resource::Buffer(&self.quads)),
-                        ("pattern", Resource::Buffer(&self.pattern)),
-                        ("listed", Resource::Buffer(&self.listed)),
-                        ("species", Resource::Buffer(&species.table)),
-                        ("seeds", Resource::Buffer(&self.seeds)),
-                        ("draws", Resource::Buffer(&self.draws)),
-                        ("heights", Resource::Texture(&terrain.heights, Sampler::Nearest)),
-                        ("densities", Resource::Texture(&species.densities, Sampler::Nearest)),
-                        ("scene_size", Resource::Buffer(&self.species_count)),
-                    ],
-                );
-                pass.push(&SeedParameters { first_quad: work.fresh.0, ..self.parameters });
-                pass.dispatch([work.fresh.1, 1, 1]);
-            });
-        }
-        if work.tiles.is_empty() {
+        if work.fresh.1 == 0 {
             return;
         }
-        let targets = Targets {
-            colors: &[Attachment { image: &self.coverage, resolve: None, clear: None }],
-            depth: None,
-            layers: self.coverage.layers(),
-        };
-        let side = self.parameters.quad_side;
-        recorder.render("coverage tiles", &targets, |pass| {
-            let bound = [
-                ("quads", Resource::Buffer(&self.quads)),
-                ("species", Resource::Buffer(&species.table)),
-                ("heights", Resource::Texture(&terrain.heights, Sampler::Nearest)),
-                ("densities", Resource::Texture(&species.densities, Sampler::Nearest)),
-                ("seeds", Resource::Buffer(&self.seeds)),
-            ];
-            pass.bind(&self.programs.1, &bound);
-            for (quad, layer, _) in &work.tiles {
-                let tile = CoverageTile { offset: [0.0; 2], side, layer: *layer };
-                let parameters = SeedParameters { first_quad: *quad, ..self.parameters };
-                pass.push(&ExpectedCoverage { parameters, tile });
-                pass.draw(3, 1);
-            }
-            pass.bind(&self.programs.2, &bound);
-            for (_, layer, around) in &work.tiles {
-                for (region, offset) in around {
-                    let offset = offset.map(|v| v as f32);
-                    pass.push(&CoverageTile { offset, side, layer: *layer });
-                    let command = u64::from(*region) * size_of::<DrawCommand>() as u64;
-                    pass.draw_indexed_indirect(&self.quad_indices, &self.draws, command);
-                }
-            }
+        recorder.compute("seeds", |pass| {
+            pass.bind(
+                &self.program,
+                &[
+                    ("quads", Resource::Buffer(&self.quads)),
+                    ("pattern", Resource::Buffer(&self.pattern)),
+                    ("listed", Resource::Buffer(&self.listed)),
+                    ("species", Resource::Buffer(&species.table)),
+                    ("seeds", Resource::Buffer(&self.seeds)),
+                    ("draws", Resource::Buffer(&self.draws)),
+                    ("heights", Resource::Texture(&terrain.heights, Sampler::Nearest)),
+                    ("densities", Resource::Texture(&species.densities, Sampler::Nearest)),
+                    ("scene_size", Resource::Buffer(&self.species_count)),
+                ],
+            );
+            pass.push(&SeedParameters { first_quad: work.fresh.0, ..self.parameters });
+            pass.dispatch([work.fresh.1, 1, 1]);
         });
     }
 }

@@ -1,13 +1,16 @@
 //! Species on the GPU: the table, the z-field views of all species in one array, view bases, masks and density maps.
 
+use std::borrow::Cow;
+
 use super::density::{HEIGHT_SOFTNESS, SLOPE_SOFTNESS};
+use super::listed;
 use crate::bake::{Baked, ZField};
 use crate::gpu::interface::{NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
 use crate::physics::masks::combination_table;
 use crate::physics::views;
 use crate::plan::Plan;
-use crate::scene::{Distribution, Raster, Scene};
+use crate::scene::{Distribution, Raster, Scene, Species, TreePosition};
 use crate::{Error, Result};
 
 /// Everything about species that shaders read.
@@ -26,7 +29,7 @@ pub struct SpeciesData {
     pub masks: Buffer,
     /// Rows of the combination table.
     pub mask_rows: u32,
-    /// Density maps, one a layer.
+    /// Density maps, also of listed trees, one a layer.
     pub densities: Image,
 }
 
@@ -57,7 +60,10 @@ impl SpeciesData {
             }
         }
         let bases: Vec<ViewBasis> = baked.iter().flat_map(|b| view_bases(&b.species.views)).collect();
-        let maps: Vec<&Raster> = scene.species.iter().filter_map(density_map).collect();
+        let maps: Vec<Option<Map>> =
+            scene.species.iter().map(|s| density_map(s, scene.terrain.extent)).collect();
+        let mut rows = rows(scene, plan, baked, &maps, view_count);
+        let maps: Vec<&Raster> = maps.iter().flatten().map(|m| m.relative.as_ref()).collect();
         let size = maps.iter().fold([1, 1], |s: [u32; 2], m| [s[0].max(m.width), s[1].max(m.height)]);
         let densities = gpu.image(&ImageDesc {
             name: "density maps",
@@ -76,7 +82,6 @@ impl SpeciesData {
             }
             gpu.upload_image(&densities, 0, layer as u32, 1, bytemuck::cast_slice(&padded))?;
         }
-        let mut rows = rows(scene, plan, baked, view_count);
         if rows.is_empty() {
             rows.push(bytemuck::Zeroable::zeroed());
         }
@@ -130,14 +135,49 @@ fn view_bases(field: &ZField) -> Vec<ViewBasis> {
         .collect()
 }
 
-fn density_map(species: &crate::scene::Species) -> Option<&Raster> {
+/// A density over the whole terrain.
+struct Map<'a> {
+    /// Relative to its largest value.
+    relative: Cow<'a, Raster>,
+    /// Listed trees per m² where it is 1.
+    listed: f64,
+}
+
+/// The map of a species' density, or of its listed trees; `None`: the same everywhere.
+fn density_map(species: &Species, extent: [f64; 2]) -> Option<Map<'_>> {
     match &species.distribution {
-        Distribution::Density { map, .. } => map.as_deref(),
-        Distribution::Positions(_) => None,
+        Distribution::Density { map, .. } => {
+            map.as_deref().map(|m| Map { relative: Cow::Borrowed(m), listed: 0.0 })
+        }
+        Distribution::Positions(list) => {
+            let (relative, listed) = listed::density(extent, list);
+            Some(Map { relative: Cow::Owned(relative), listed })
+        }
     }
 }
 
-fn rows(scene: &Scene, plan: &Plan, baked: &[Baked], view_count: u32) -> Vec<Row> {
+/// Texels of the map that a species' density needs.
+pub(crate) fn density_map_size(species: &Species, extent: [f64; 2]) -> Option<[u32; 2]> {
+    match &species.distribution {
+        Distribution::Density { map, .. } => map.as_ref().map(|m| [m.width, m.height]),
+        Distribution::Positions(list) => Some(listed::grid_size(extent, list.len())),
+    }
+}
+
+/// Mean of the squared scale of a species' trees: (a² + ab + b²) / 3 where it is drawn evenly from `[a, b]`.
+fn mean_squared_scale(species: &Species) -> f64 {
+    let [a, b] = species.scale.map(f64::from);
+    let drawn = (a * a + a * b + b * b) / 3.0;
+    match &species.distribution {
+        Distribution::Positions(list) if !list.is_empty() => {
+            let square = |p: &TreePosition| p.scale.map_or(drawn, |s| f64::from(s).powi(2));
+            list.iter().map(square).sum::<f64>() / list.len() as f64
+        }
+        _ => drawn,
+    }
+}
+
+fn rows(scene: &Scene, plan: &Plan, baked: &[Baked], maps: &[Option<Map>], view_count: u32) -> Vec<Row> {
     let mut next_map = 0;
     let mut rows = Vec::new();
     for (k, (species, Baked { species: bake, tables })) in scene.species.iter().zip(baked).enumerate() {
@@ -147,14 +187,15 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Baked], view_count: u32) -> Vec<Row
         {
             (max_density, between, slope) = (*d, *between_heights, *below_slope);
         }
-        let density_layer = match density_map(species) {
+        let density_layer = match &maps[k] {
             Some(_) => {
                 next_map += 1;
                 next_map - 1
             }
             None => NO_PAGE,
         };
-        let map_size = density_map(species).map_or([1.0; 2], |m| [m.width as f32, m.height as f32]);
+        let map_size =
+            maps[k].as_ref().map_or([1.0; 2], |m| [m.relative.width as f32, m.relative.height as f32]);
         let [low, high] = between.unwrap_or([-1e30, 1e30]);
         let tangent = slope.map_or(1e30, |s| s.to_radians().tan());
         rows.push(Row {
@@ -178,9 +219,10 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Baked], view_count: u32) -> Vec<Row
             crown_base: (bake.crown_base - bake.center) / bake.half_height,
             // Black leaves have no colour to compare with.
             bark: std::array::from_fn(|i| bake.bark[i] / bake.albedo()[i].max(1e-3)),
-            area: tables.area,
+            mean_area: std::f32::consts::PI * bake.crown_radius.powi(2) * mean_squared_scale(species) as f32,
             vertical_scale: tables.vertical_scale,
             max_thickness: tables.max_thickness,
+            listed_density: maps[k].as_ref().map_or(0.0, |m| m.listed as f32),
             ..bytemuck::Zeroable::zeroed()
         });
     }

@@ -4,7 +4,9 @@ use super::cache::SlotCache;
 use super::quadtree::{MIN_REFINE, QuadKey, Quadtree};
 use crate::frame::camera::Eye;
 use crate::frame::cascades::Cascade;
-use crate::gpu::interface::{TERRAIN_CELLS, TERRAIN_HEIGHTS, TERRAIN_SLOPES, TerrainParameters, TerrainQuad};
+use crate::gpu::interface::{
+    NO_PAGE, TERRAIN_CELLS, TERRAIN_HEIGHTS, TERRAIN_SLOPES, TerrainParameters, TerrainQuad,
+};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Program, Recorder, Resource, Sampler, shaders, vk};
 use crate::plan::Plan;
 use crate::scene::{Albedo, Scene};
@@ -32,9 +34,13 @@ pub struct TerrainData {
     texels_per_step: f64,
 }
 
-/// Where each draw's quads are in [`TerrainData::quads`].
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+/// What is drawn: quads, and where each draw's are in [`TerrainData::quads`].
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct TerrainDraws {
+    /// All quads.
+    pub quads: Vec<TerrainQuad>,
+    /// Keys of the camera's.
+    pub keys: Vec<QuadKey>,
     /// First and number of the camera's quads.
     pub camera: (u32, u32),
     /// The same for each cascade.
@@ -89,7 +95,7 @@ impl TerrainData {
                 usage: vk::ImageUsageFlags::STORAGE,
             })
         };
-        let tree = Quadtree::new(terrain);
+        let tree = Quadtree::new(terrain, plan.plain_side);
         Ok(TerrainData {
             heights,
             albedo,
@@ -122,17 +128,11 @@ impl TerrainData {
         }
     }
 
-    /// Selects this frame's quads and uploads them.
+    /// Selects this frame's quads; [`TerrainData::upload`] them when they have their coverage tiles.
     ///
     /// # Errors
     /// [`Error::Usage`] when the view needs more tiles than the plan holds even at the coarsest.
-    pub fn update(
-        &mut self,
-        gpu: &Gpu,
-        eye: &Eye,
-        cascades: &[Cascade],
-        pixels: f64,
-    ) -> Result<TerrainDraws> {
+    pub fn update(&mut self, eye: &Eye, cascades: &[Cascade], pixels: f64) -> Result<TerrainDraws> {
         let most = self.cache.capacity() as usize;
         let planes = eye.planes();
         let wanted = eye.pixels_at_1m / (f64::from(TERRAIN_CELLS) * pixels);
@@ -147,7 +147,7 @@ impl TerrainData {
             let shadows: Option<Vec<_>> =
                 cascades.iter().map(|c| select(&|b| b.touches(&c.planes, eye.position))).collect();
             if let (Some(camera), Some(shadows)) = (camera, shadows)
-                && let Some(draws) = self.assign(gpu, &camera, &shadows)?
+                && let Some(draws) = self.assign(&camera, &shadows)
             {
                 return Ok(draws);
             }
@@ -161,21 +161,16 @@ impl TerrainData {
         }
     }
 
-    fn assign(
-        &mut self,
-        gpu: &Gpu,
-        camera: &[QuadKey],
-        shadows: &[Vec<QuadKey>],
-    ) -> Result<Option<TerrainDraws>> {
+    fn assign(&mut self, camera: &[QuadKey], shadows: &[Vec<QuadKey>]) -> Option<TerrainDraws> {
         self.cache.begin_frame();
         let (mut all, mut fresh) = (Vec::new(), Vec::new());
-        let mut draws = TerrainDraws::default();
+        let mut draws = TerrainDraws { keys: camera.to_vec(), ..TerrainDraws::default() };
         for (k, list) in std::iter::once(camera).chain(shadows.iter().map(Vec::as_slice)).enumerate() {
             let first = all.len() as u32;
             for key in list {
                 let Some(slot) = self.cache.slot(*key) else {
                     self.cache = SlotCache::new(self.cache.capacity());
-                    return Ok(None);
+                    return None;
                 };
                 let spacing = self.tree.spacing(key.level);
                 let corner = [key.x, key.y].map(|v| (v * TERRAIN_CELLS * spacing) as i32);
@@ -184,6 +179,8 @@ impl TerrainData {
                     spacing: spacing as i32,
                     layer: slot.index,
                     morph: self.tree.morph(key.level, self.refine).map(|m| m as f32),
+                    cover_layer: NO_PAGE,
+                    ..bytemuck::Zeroable::zeroed()
                 };
                 all.push(quad);
                 if slot.fresh {
@@ -199,8 +196,16 @@ impl TerrainData {
         }
         draws.fresh = (all.len() as u32, fresh.len() as u32);
         all.extend(fresh);
-        gpu.upload(&self.quads, 0, &all)?;
-        Ok(Some(draws))
+        draws.quads = all;
+        Some(draws)
+    }
+
+    /// Uploads the quads.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    pub fn upload(&self, gpu: &Gpu, draws: &TerrainDraws) -> Result<()> {
+        gpu.upload(&self.quads, 0, &draws.quads)
     }
 
     /// Records the production of fresh tiles.

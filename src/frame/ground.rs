@@ -4,9 +4,10 @@ use super::shadows::TerrainPush;
 use super::targets::ImageTargets;
 use crate::Result;
 use super::Forest;
+use crate::forest::coverage;
 use crate::forest::tables::TableData;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
-use crate::gpu::interface::{GRID_SIDE, NO_PAGE, Species, TERRAIN_CELLS, TERRAIN_HEIGHTS};
+use crate::gpu::interface::{Species, TERRAIN_CELLS, TERRAIN_HEIGHTS};
 use crate::gpu::{
     Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler,
     Targets, shaders, vk,
@@ -18,9 +19,8 @@ pub struct Ground {
     /// Indices of a quad's mesh.
     pub indices: Buffer,
     program: Program,
-    /// Stand for coverage and pages in scenes without trees.
+    /// Stands for coverage tiles in scenes without trees.
     no_coverage: Image,
-    no_pages: Buffer,
     no_species: Buffer,
     no_tables: TableData,
 }
@@ -53,15 +53,17 @@ impl Ground {
                 depth: DepthTest::Reverse,
                 blend: Blend::Replace,
                 constants: &[
-                    (0, forest.map_or(0, |f| f.species.count)),
-                    (1, float(forest.map_or(1, |f| f.tables.angles))),
-                    (2, float(forest.map_or(1, |f| f.tables.densities))),
-                    (3, u32::from(plan.cascades > 0)),
+                    (0, plan.cover_groups),
+                    (1, float(plan.coverage_size)),
+                    (2, forest.map_or(0, |f| f.species.count)),
+                    (3, float(forest.map_or(1, |f| f.tables.angles))),
+                    (4, float(forest.map_or(1, |f| f.tables.densities))),
+                    (5, u32::from(plan.cascades > 0)),
                 ],
             })?,
             no_coverage: gpu.image(&ImageDesc {
                 name: "no coverage",
-                format: vk::Format::R8G8B8A8_UNORM,
+                format: coverage::FORMAT,
                 size: [1; 2],
                 layers: 1,
                 levels: 1,
@@ -70,7 +72,6 @@ impl Ground {
             })?,
             no_species: gpu.buffer("no species", size_of::<Species>() as u64)?,
             no_tables: TableData::new(gpu, &[])?,
-            no_pages: gpu.buffer_with("no pages", &vec![NO_PAGE; (GRID_SIDE * GRID_SIDE) as usize])?,
         })
     }
 
@@ -95,8 +96,7 @@ impl Ground {
         let colors: Vec<_> =
             targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), forest.is_none())).collect();
         let depth = Some(targets.depth.attachment(Some([0.0; 4]), forest.is_none()));
-        let (coverage, pages) =
-            forest.map_or((&self.no_coverage, &self.no_pages), |f| (&f.seeds.coverage, &f.seeds.pages));
+        let tiles = forest.map_or(&self.no_coverage, |f| &f.coverage.tiles);
         let (tables, species) =
             forest.map_or((&self.no_tables, &self.no_species), |f| (&f.tables, &f.species.table));
         recorder.render("terrain", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
@@ -109,8 +109,7 @@ impl Ground {
                     ("slope_tiles", Resource::Texture(&terrain.slope_tiles, Sampler::Linear)),
                     ("albedo", Resource::Texture(&terrain.albedo, Sampler::Linear)),
                     ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
-                    ("coverage", Resource::Texture(coverage, Sampler::Linear)),
-                    ("pages", Resource::Buffer(pages)),
+                    ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
                     ("pair_table", Resource::Texture(&tables.pairs, Sampler::Linear)),
                     ("view_table", Resource::Texture(&tables.views, Sampler::Linear)),
                     ("species", Resource::Buffer(species)),

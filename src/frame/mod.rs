@@ -14,6 +14,7 @@ use std::sync::Arc;
 
 use crate::Result;
 use crate::bake::Baked;
+use crate::forest::coverage::CoverageData;
 use crate::forest::cull::{CullData, TreeCounts};
 use crate::forest::seeds::SeedData;
 use crate::forest::species::SpeciesData;
@@ -36,8 +37,10 @@ use view::Light;
 
 /// What lives between frames for the trees; absent from scenes without.
 pub struct Forest {
-    /// Seeds and coverage tiles.
+    /// Seeds.
     pub seeds: SeedData,
+    /// Coverage tiles.
+    pub coverage: CoverageData,
     /// Species.
     pub species: SpeciesData,
     /// Forest tables of the species.
@@ -74,6 +77,8 @@ pub struct FrameReport {
     pub terrain_quads: u32,
     /// Seed quads culled.
     pub seed_quads: u32,
+    /// Coverage tiles produced.
+    pub coverage_tiles: u32,
 }
 
 impl Renderer {
@@ -82,11 +87,13 @@ impl Renderer {
     /// # Errors
     /// [`crate::Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, scene: Arc<Scene>, plan: Plan, baked: &[Baked]) -> Result<Self> {
+        let terrain = TerrainData::new(gpu, &scene, &plan)?;
         let forest = if plan.range > 0.0 {
             let species = SpeciesData::new(gpu, &scene, &plan, baked)?;
             let tables: Vec<_> = baked.iter().map(|b| b.tables.as_ref()).collect();
             let tables = TableData::new(gpu, &tables)?;
             Some(Forest {
+                coverage: CoverageData::new(gpu, &scene, &plan, &species, &terrain.tree)?,
                 seeds: SeedData::new(gpu, &scene, &plan)?,
                 cull: CullData::new(gpu, &scene, &plan, &tables)?,
                 pass: Trees::new(gpu, &scene, &plan, species.mask_rows)?,
@@ -99,7 +106,7 @@ impl Renderer {
         Ok(Renderer {
             view: gpu.buffer("view", size_of::<View>() as u64)?,
             targets: ImageTargets::new(gpu, &plan)?,
-            terrain: TerrainData::new(gpu, &scene, &plan)?,
+            terrain,
             ground: Ground::new(gpu, &plan, forest.as_ref())?,
             shadows: Shadows::new(gpu, &scene, &plan)?,
             sky: SkyPass::new(gpu, &scene, &plan)?,
@@ -151,12 +158,14 @@ impl Renderer {
 
         // Stream: which quads, where in the caches, what is new.
         let pixels = f64::from(scene.settings.terrain_pixels);
-        let draws = self.terrain.update(gpu, eye, cascades, pixels)?;
+        let mut draws = self.terrain.update(eye, cascades, pixels)?;
         let mut work = None;
         if let Some(forest) = &mut self.forest {
             let reach = shadow_reach(sun, plan.cascades, plan.tallest + 0.25 * (highest - lowest));
-            work = Some(forest.seeds.update(gpu, &self.terrain.tree, eye, plan.range, reach)?);
+            let fresh = forest.seeds.update(gpu, &self.terrain.tree, eye, plan.range, reach)?;
+            work = Some((fresh, forest.coverage.update(gpu, &self.terrain.tree, &forest.seeds, &mut draws)?));
         }
+        self.terrain.upload(gpu, &draws)?;
         let seeds = self.forest.as_ref().map(|f| &f.seeds);
         let step = self.terrain.tree.step();
         let view = view::view(scene, plan, eye, &self.light, cascades, seeds, step);
@@ -164,8 +173,9 @@ impl Renderer {
 
         let mut recorder = gpu.record()?;
         self.terrain.produce(&mut recorder, &draws);
-        if let (Some(forest), Some(work)) = (&self.forest, &work) {
-            forest.seeds.produce(&mut recorder, work, &self.terrain, &forest.species);
+        if let (Some(forest), Some((fresh, tiles))) = (&self.forest, &work) {
+            forest.seeds.produce(&mut recorder, fresh, &self.terrain, &forest.species);
+            forest.coverage.produce(&mut recorder, tiles, &forest.seeds, &self.terrain, &forest.species);
             forest.cull.record(&mut recorder, &self.view, &forest.seeds, &forest.species, &forest.tables);
         }
         let trees = self.forest.as_ref().map(|f| (&f.cull, &f.seeds, &f.species));
@@ -193,6 +203,7 @@ impl Renderer {
             trees,
             terrain_quads: draws.camera.1,
             seed_quads: self.forest.as_ref().map_or(0, |f| f.seeds.visible),
+            coverage_tiles: work.map_or(0, |(_, tiles)| tiles.tiles),
         };
         Ok((report, view))
     }

@@ -106,11 +106,9 @@ pub fn view(
     let ground = [eye.position[0], eye.position[1]];
     (view.grid_camera, view.grid_offset) = split(ground, terrain_step);
     if let Some(seeds) = seeds {
-        let (quad, offset) = seeds.camera_quad(eye);
-        (view.quad_camera, view.quad_offset) = (quad, offset.map(|v| v as f32));
+        view.quad_offset = seeds.camera_quad(eye).1.map(|v| v as f32);
     }
     let scaled = |c: [f64; 3]| c.map(|v| (v * light.scale) as f32);
-    view.quad_side = plan.quad_side as f32;
     view.sun_direction = light.direction.map(|v| v as f32);
     view.cascade_count = cascades.len() as u32;
     view.sun_irradiance = scaled(light.sun);

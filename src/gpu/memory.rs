@@ -36,11 +36,13 @@ pub struct ImageDesc<'a> {
     pub usage: vk::ImageUsageFlags,
 }
 
-/// An image with one view of everything (as an array, or a volume), always in `GENERAL` layout.
+/// An image with one view of everything (as an array, or a volume), always in `GENERAL` layout; storage images with mip
+/// levels have one more of each level.
 pub struct Image {
     shared: Arc<Shared>,
     pub(super) handle: vk::Image,
     pub(super) view: vk::ImageView,
+    pub(super) level_views: Vec<vk::ImageView>,
     allocation: Option<Allocation>,
     format: vk::Format,
     size: [u32; 2],
@@ -52,7 +54,7 @@ pub struct Image {
 /// A resource waiting for its last submission.
 pub(super) enum Retired {
     Buffer(vk::Buffer, Allocation),
-    Image(vk::Image, vk::ImageView, Allocation),
+    Image(vk::Image, Vec<vk::ImageView>, Allocation),
     Program(vk::Pipeline, vk::PipelineLayout, vk::DescriptorSetLayout),
 }
 
@@ -66,8 +68,10 @@ impl Retired {
                     shared.device.destroy_buffer(b, None);
                     a
                 }
-                Retired::Image(i, v, a) => {
-                    shared.device.destroy_image_view(v, None);
+                Retired::Image(i, views, a) => {
+                    for view in views {
+                        shared.device.destroy_image_view(view, None);
+                    }
                     shared.device.destroy_image(i, None);
                     a
                 }
@@ -210,10 +214,11 @@ impl Gpu {
                 .format(d.format)
                 .subresource_range(whole(aspect));
             let view = bound.and_then(|()| s.device.create_image_view(&view, None));
-            let image = Image {
+            let mut image = Image {
                 shared: s.clone(),
                 handle,
                 view: view.unwrap_or_default(),
+                level_views: Vec::new(),
                 allocation: Some(allocation),
                 format: d.format,
                 size: d.size,
@@ -224,6 +229,20 @@ impl Gpu {
             view.map_err(device_error(d.name))?;
             s.name(handle, d.name);
             s.name(image.view, d.name);
+            if d.levels > 1 && d.usage.contains(vk::ImageUsageFlags::STORAGE) {
+                for level in 0..d.levels {
+                    let range =
+                        vk::ImageSubresourceRange { base_mip_level: level, level_count: 1, ..whole(aspect) };
+                    let one = vk::ImageViewCreateInfo::default()
+                        .image(handle)
+                        .view_type(vk::ImageViewType::TYPE_2D_ARRAY)
+                        .format(d.format)
+                        .subresource_range(range);
+                    image
+                        .level_views
+                        .push(s.device.create_image_view(&one, None).map_err(device_error(d.name))?);
+                }
+            }
             image
         };
         let barrier = [vk::ImageMemoryBarrier2::default()
@@ -334,7 +353,9 @@ impl Drop for Buffer {
 impl Drop for Image {
     fn drop(&mut self) {
         if let Some(a) = self.allocation.take() {
-            self.shared.retire(Retired::Image(self.handle, self.view, a));
+            let mut views = std::mem::take(&mut self.level_views);
+            views.push(self.view);
+            self.shared.retire(Retired::Image(self.handle, views, a));
         }
     }
 }

@@ -20,11 +20,13 @@ pub enum Sampler {
     LinearBorder,
     /// Bilinear within the nearest mip level; repeats.
     LinearRepeat,
+    /// Bilinear, and linear between mip levels; clamps to the edge.
+    Trilinear,
 }
 
 impl Sampler {
-    pub(super) const ALL: [Sampler; 4] =
-        [Sampler::Nearest, Sampler::Linear, Sampler::LinearBorder, Sampler::LinearRepeat];
+    pub(super) const ALL: [Sampler; 5] =
+        [Sampler::Nearest, Sampler::Linear, Sampler::LinearBorder, Sampler::LinearRepeat, Sampler::Trilinear];
 }
 
 pub(super) fn make_samplers(device: &ash::Device) -> Result<Vec<vk::Sampler>> {
@@ -38,7 +40,11 @@ pub(super) fn make_samplers(device: &ash::Device) -> Result<Vec<vk::Sampler>> {
         let create = vk::SamplerCreateInfo::default()
             .mag_filter(filter)
             .min_filter(filter)
-            .mipmap_mode(vk::SamplerMipmapMode::NEAREST)
+            .mipmap_mode(if *s == Sampler::Trilinear {
+                vk::SamplerMipmapMode::LINEAR
+            } else {
+                vk::SamplerMipmapMode::NEAREST
+            })
             .address_mode_u(address)
             .address_mode_v(address)
             .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE)

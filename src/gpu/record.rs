@@ -29,8 +29,10 @@ pub enum Resource<'a> {
     Buffer(&'a Buffer),
     /// A sampled image.
     Texture(&'a Image, Sampler),
-    /// A storage image, level 0.
+    /// A storage image without mip levels.
     Storage(&'a Image),
+    /// A mip level of a storage image that has several.
+    StorageLevel(&'a Image, u32),
 }
 
 /// A colour or depth attachment.
@@ -350,6 +352,13 @@ impl Work<'_, '_> {
                 (Some(Resource::Storage(r)), vk::DescriptorType::STORAGE_IMAGE) => {
                     image = image.image_view(r.view).image_layout(vk::ImageLayout::GENERAL);
                     true
+                }
+                (Some(Resource::StorageLevel(r, level)), vk::DescriptorType::STORAGE_IMAGE) => {
+                    let view = r.level_views.get(level as usize);
+                    image = image
+                        .image_view(view.copied().unwrap_or_default())
+                        .image_layout(vk::ImageLayout::GENERAL);
+                    view.is_some()
                 }
                 _ => false,
             };

@@ -1,0 +1,34 @@
+// What trees cover of the ground in top view, and how densely each species stands (BN12, section 4): a lookup in the
+// coverage tile of the terrain quad. Where discs are too small to tell, coverage is what the tables expect.
+
+layout(location = 3) in vec3 cover_at;          // texture coordinates in the tile, and least mip level
+layout(location = 4) flat in float cover_disc;  // log2 of the mean disc area in texels of mip 0
+layout(location = 5) flat in uint cover_layer;  // first layer
+
+layout(binding = 6) uniform sampler2DArray cover_tiles;
+layout(constant_id = 0) const uint COVER_LAYERS = 0u; // layers a tile; 0: no trees
+layout(constant_id = 1) const float COVER_SIDE = 256.0;
+
+struct Cover {
+    float resolved;                   // 0 where discs are too small to tell
+    vec4 channels[COVER_GROUPS];      // coverage as stored, then density times mean area of each species
+};
+
+// Density times mean area of a species.
+float species_thickness(Cover c, uint k) { return c.channels[(k + 1u) >> 2u][(k + 1u) & 3u]; }
+
+// The tile's level of detail follows the pixel's footprint. Where a quad morphs to its parent's shape the least level
+// rises to 1, where the parent's tile takes over at its level 0 with the same texels: nothing changes when quads do.
+Cover cover() {
+    Cover c;
+    for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] = vec4(0.0);
+    vec2 dx = dFdx(cover_at.xy), dy = dFdy(cover_at.xy);
+    float footprint = 0.5 * log2(max(max(dot(dx, dx), dot(dy, dy)), 1e-30)) + log2(COVER_SIDE);
+    float lod = max(footprint, cover_at.z);
+    for (uint g = 0u; g < COVER_LAYERS; g++) {
+        c.channels[g] = textureLod(cover_tiles, vec3(cover_at.xy, float(cover_layer + g)), min(lod, 3.0));
+    }
+    // Discs fade where their mean is 1/4 to 1/16 of a texel of this level, and where levels end.
+    c.resolved = clamp(0.5 * (cover_disc + 4.0) - lod, 0.0, 1.0) * clamp(3.5 - lod, 0.0, 1.0);
+    return c;
+}

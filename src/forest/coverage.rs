@@ -1,0 +1,364 @@
+//! Coverage tiles: what of the ground trees cover in top view, and each species' density, for every terrain quad that the
+//! camera sees, near or far (BN12, section 4).
+//!
+//! A tile holds the union of its trees' discs in one channel and Λ·A a species in the others, four channels a layer, with
+//! mip levels 0 to 3. Its quad spans all but a gutter of [`COVER_GUTTER`] texels on each side, drawn with what is there, so
+//! that lookups up to the quad's edge are right in every level, and equal in neighbouring tiles. Discs come from the seeds'
+//! own candidates, so they are the very trees that are drawn one by one nearby.
+//!
+//! * Discs smaller than about a texel are drawn on a grid two or four times finer, and averaged: their union is what it
+//!   is at finer levels too. Once a disc is under 1/16 texel, none is drawn.
+//! * Quads whose own tile would be needlessly fine use that of an ancestor: of the finest level with useful texels, or of
+//!   a coarser one when there are not slots enough for a frame. All quads of a level change together, so that neighbours
+//!   have texels of equal size.
+
+use super::cache::SlotCache;
+use super::quadtree::{QuadKey, Quadtree};
+use super::seeds::SeedData;
+use super::species::{SpeciesData, density_map_size};
+use super::terrain::{TerrainData, TerrainDraws};
+use crate::Result;
+use crate::gpu::interface::{
+    COVER_GUTTER, COVER_LEVELS, COVER_SCRATCH, CoverageParameters, CoverageSplat, CoverageTile,
+    SeedParameters, SeedQuad,
+};
+use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Program, Recorder, Resource, Sampler, shaders, vk};
+use crate::plan::Plan;
+use crate::scene::{Distribution, Scene};
+
+/// Texels finer than this are needless, m.
+const LEAST_TEXEL: f64 = 0.35;
+/// So are texels finer than this part of the smallest species' crown radius.
+const LEAST_RADIUS_PART: f64 = 0.1;
+/// Discs of a smaller part of a texel are not drawn (BN12, section 4).
+const LEAST_DISC: f64 = 1.0 / 16.0;
+/// Smallest radius of a mean disc on the grid on which discs are drawn, in cells of that grid.
+const LEAST_RADIUS: f64 = 0.55;
+/// Most workgroups a dispatch.
+const MOST_GROUPS: u32 = 32768;
+/// Texels along a side of a workgroup's block.
+const BLOCK: u32 = 16;
+
+/// Format of the tiles.
+pub const FORMAT: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
+
+/// Both push constants of the production.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Push {
+    seeds: SeedParameters,
+    coverage: CoverageParameters,
+}
+
+/// The tiles and what produces them.
+pub struct CoverageData {
+    /// The tiles, `groups` layers a slot: coverage, then a channel a species.
+    pub tiles: Image,
+    /// Layers a slot.
+    pub groups: u32,
+    /// Key of the tile in each slot and in use this frame, for tests.
+    pub held: Vec<(QuadKey, u32)>,
+    cache: SlotCache<QuadKey>,
+    sums: Buffer,
+    quads: Buffer,
+    splats: Buffer,
+    jobs: Buffer,
+    splat: Program,
+    resolve: Program,
+    /// Finest level with tiles of its own.
+    finest: u32,
+    /// Mean area of a disc, m².
+    disc: f64,
+    /// Radius of the largest disc, m.
+    reach: f64,
+    /// Length over which densities may change, m.
+    smooth: f64,
+}
+
+/// Tiles produced together, through one scratch buffer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Batch {
+    tiles: (u32, u32),
+    splats: (u32, u32),
+}
+
+/// What a frame has to produce.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct CoverageWork {
+    /// Number of tiles.
+    pub tiles: u32,
+    batches: Vec<Batch>,
+}
+
+impl CoverageData {
+    /// Allocates for a plan.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] when out of memory.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        plan: &Plan,
+        species: &SpeciesData,
+        tree: &Quadtree,
+    ) -> Result<Self> {
+        let size = plan.coverage_size;
+        let (mut weight, mut area, mut reach, mut smallest) = (0.0, 0.0, 0.0f64, f64::INFINITY);
+        let mut smooth =
+            if scene.terrain.heights.is_some() { scene.terrain.cell_size } else { f64::INFINITY };
+        let extent = scene.terrain.extent;
+        for (s, row) in scene.species.iter().zip(&species.rows) {
+            let radius = f64::from(row.crown_radius);
+            let mut scale = f64::from(s.scale[1]);
+            let density = match &s.distribution {
+                Distribution::Density { max_density, .. } => f64::from(*max_density),
+                Distribution::Positions(list) => {
+                    let largest = list.iter().filter_map(|p| p.scale).fold(0.0, f32::max);
+                    scale = scale.max(f64::from(largest));
+                    list.len() as f64 / (extent[0] * extent[1])
+                }
+            };
+            weight += density;
+            area += density * f64::from(row.mean_area);
+            reach = reach.max(radius * scale);
+            smallest = smallest.min(radius);
+            if let Some(map) = density_map_size(s, extent) {
+                smooth = smooth.min(extent[0] / f64::from(map[0])).min(extent[1] / f64::from(map[1]));
+            }
+        }
+        let least = LEAST_TEXEL.max(LEAST_RADIUS_PART * smallest);
+        let inner = f64::from(size - 2 * COVER_GUTTER);
+        let finest = (0..tree.levels()).rev().find(|l| tree.side(*l) / inner >= least).unwrap_or(0);
+        let constants = [(0, size), (1, scene.species.len() as u32)];
+        let texels = u64::from(size) * u64::from(size);
+        // Zeros, as the production leaves them.
+        let sums =
+            gpu.buffer_with("coverage sums", &vec![0u32; (u64::from(COVER_SCRATCH) * texels) as usize])?;
+        Ok(CoverageData {
+            tiles: gpu.image(&ImageDesc {
+                name: "coverage tiles",
+                format: FORMAT,
+                size: [size; 2],
+                layers: plan.cover_slots * plan.cover_groups,
+                levels: COVER_LEVELS,
+                samples: 1,
+                usage: vk::ImageUsageFlags::STORAGE,
+            })?,
+            groups: plan.cover_groups,
+            held: Vec::new(),
+            cache: SlotCache::new(plan.cover_slots),
+            sums,
+            quads: gpu.buffer("coverage quads", 0)?,
+            splats: gpu.buffer("coverage splats", 0)?,
+            jobs: gpu.buffer("coverage jobs", 0)?,
+            splat: gpu.compute(&shaders::FOREST_COVERAGE_SPLAT_COMP, &constants[..1])?,
+            resolve: gpu.compute(&shaders::FOREST_COVERAGE_RESOLVE_COMP, &constants)?,
+            finest,
+            disc: if weight > 0.0 { area / weight } else { 0.0 },
+            reach,
+            smooth,
+        })
+    }
+
+    /// Gives each quad that the camera draws its tile, and says which tiles are to be produced.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] when out of memory.
+    pub fn update(
+        &mut self,
+        gpu: &Gpu,
+        tree: &Quadtree,
+        seeds: &SeedData,
+        draws: &mut TerrainDraws,
+    ) -> Result<CoverageWork> {
+        let keys = self.choose(&draws.keys);
+        self.cache.begin_frame();
+        self.held.clear();
+        let (mut jobs, mut quads, mut splats) = (Vec::new(), Vec::new(), Vec::new());
+        let mut work = CoverageWork::default();
+        let (mut batch, mut words) = (Batch::default(), 0);
+        for (quad, key) in draws.quads[draws.camera.0 as usize..].iter_mut().zip(keys) {
+            // There are no more keys than slots.
+            let Some(slot) = self.cache.slot(key) else { continue };
+            let own = tree.side(key.level);
+            let texel = self.texel(own);
+            let corner =
+                [0, 1].map(|k| f64::from(quad.corner[k]) * tree.step() - f64::from([key.x, key.y][k]) * own);
+            let size = f64::from(self.tiles.size()[0]);
+            quad.cover_offset = corner.map(|c| ((c / texel + f64::from(COVER_GUTTER)) / size) as f32);
+            let side =
+                f64::from(quad.spacing) * f64::from(crate::gpu::interface::TERRAIN_CELLS) * tree.step();
+            quad.cover_scale = (side / texel / size) as f32;
+            quad.cover_layer = slot.index * self.groups;
+            quad.cover_disc = (self.disc / (texel * texel)).max(1e-30).log2() as f32;
+            quad.cover_floor = if side == own { 1.0 } else { 0.0 };
+            if !slot.fresh {
+                continue;
+            }
+            let (mut job, low) = self.job(key, own, slot.index, f64::from(seeds.parameters.cell_size));
+            let taken = job.fine.max(1).pow(2);
+            if words + taken > COVER_SCRATCH {
+                work.batches.push(batch);
+                let (tiles, discs) = (jobs.len() as u32, splats.len() as u32);
+                (batch, words) = (Batch { tiles: (tiles, 0), splats: (discs, 0) }, 0);
+            }
+            job.first = words * self.tiles.size()[0].pow(2);
+            words += taken;
+            if job.fine > 0 {
+                self.overlapping(seeds, low, texel, jobs.len() as u32, &mut quads, &mut splats);
+            }
+            jobs.push(job);
+            batch.tiles.1 += 1;
+            batch.splats.1 = splats.len() as u32 - batch.splats.0;
+        }
+        if batch.tiles.1 > 0 {
+            work.batches.push(batch);
+        }
+        work.tiles = jobs.len() as u32;
+        renew(gpu, &mut self.jobs, "coverage jobs", &jobs)?;
+        renew(gpu, &mut self.quads, "coverage quads", &quads)?;
+        renew(gpu, &mut self.splats, "coverage splats", &splats)?;
+        Ok(work)
+    }
+
+    /// The tile of each quad: its own or an ancestor's, of the finest level for which all fit the slots.
+    fn choose(&self, quads: &[QuadKey]) -> Vec<QuadKey> {
+        let mut finest = self.finest;
+        loop {
+            let keys: Vec<QuadKey> = quads.iter().map(|q| q.ancestor(finest)).collect();
+            let mut different = keys.clone();
+            different.sort_unstable();
+            different.dedup();
+            if finest == 0 || different.len() <= self.cache.capacity() as usize {
+                return keys;
+            }
+            finest -= 1;
+        }
+    }
+
+    /// Metres a texel of the tile of a quad of this side.
+    fn texel(&self, side: f64) -> f64 {
+        side / f64::from(self.tiles.size()[0] - 2 * COVER_GUTTER)
+    }
+
+    /// How to produce a tile, and its south-west corner, m.
+    fn job(&self, key: QuadKey, side: f64, slot: u32, cell_size: f64) -> (CoverageTile, [f64; 2]) {
+        let texel = self.texel(side);
+        let low = [key.x, key.y].map(|v| f64::from(v) * side - f64::from(COVER_GUTTER) * texel);
+        let cell = low.map(|v| (v / cell_size).floor());
+        let ratio = self.disc / (texel * texel);
+        let radius = (ratio / std::f64::consts::PI).sqrt();
+        let fine = [1, 2, 4].into_iter().find(|f| f64::from(*f) * radius >= LEAST_RADIUS).unwrap_or(4);
+        // Densities are interpolated over a sixth of what they change in, at most; and averaged from half of it on.
+        let step =
+            [16, 8, 4, 2].into_iter().find(|s| f64::from(*s) * texel <= self.smooth / 6.0).unwrap_or(1);
+        let samples = [1, 2].into_iter().find(|n| texel <= f64::from(*n) * 0.5 * self.smooth).unwrap_or(4);
+        let tile = CoverageTile {
+            cell: cell.map(|c| c as i32),
+            cell_offset: [0, 1].map(|k| (low[k] / cell_size - cell[k]) as f32),
+            texel: texel as f32,
+            layer: slot * self.groups,
+            first: 0,
+            fine: if ratio >= LEAST_DISC { fine } else { 0 },
+            step,
+            samples,
+        };
+        (tile, low)
+    }
+
+    /// Every seed quad from which a disc may reach a tile.
+    fn overlapping(
+        &self,
+        seeds: &SeedData,
+        low: [f64; 2],
+        texel: f64,
+        tile: u32,
+        quads: &mut Vec<SeedQuad>,
+        splats: &mut Vec<CoverageSplat>,
+    ) {
+        let (side, count) = (seeds.side, seeds.quad_count);
+        let across = f64::from(self.tiles.size()[0]) * texel;
+        let span = |k: usize| {
+            let first = ((low[k] - self.reach) / side).floor().max(0.0) as i32;
+            let last = ((low[k] + across + self.reach) / side).floor() as i32;
+            first..=last.min(count[k] - 1)
+        };
+        for y in span(1) {
+            for x in span(0) {
+                quads.push(seeds.seed_quad((x, y), 0));
+                let corner = [(x, 0), (y, 1)].map(|(v, k)| (f64::from(v) * side - low[k]) as f32);
+                splats.push(CoverageSplat { corner, tile, ..bytemuck::Zeroable::zeroed() });
+            }
+        }
+    }
+
+    /// Records the production of fresh tiles.
+    pub fn produce(
+        &self,
+        recorder: &mut Recorder,
+        work: &CoverageWork,
+        seeds: &SeedData,
+        terrain: &TerrainData,
+        species: &SpeciesData,
+    ) {
+        if work.tiles == 0 {
+            return;
+        }
+        let blocks = self.tiles.size()[0] / BLOCK;
+        recorder.compute("coverage tiles", |pass| {
+            let push = |first_tile, first_splat| Push {
+                seeds: seeds.parameters,
+                coverage: CoverageParameters { reach: self.reach as f32, first_tile, first_splat },
+            };
+            for batch in &work.batches {
+                pass.bind(
+                    &self.splat,
+                    &[
+                        ("quads", Resource::Buffer(&self.quads)),
+                        ("pattern", Resource::Buffer(&seeds.pattern)),
+                        ("listed", Resource::Buffer(&seeds.listed)),
+                        ("species", Resource::Buffer(&species.table)),
+                        ("splats", Resource::Buffer(&self.splats)),
+                        ("tiles", Resource::Buffer(&self.jobs)),
+                        ("sums", Resource::Buffer(&self.sums)),
+                        ("heights", Resource::Texture(&terrain.heights, Sampler::Nearest)),
+                        ("densities", Resource::Texture(&species.densities, Sampler::Nearest)),
+                        ("scene_size", Resource::Buffer(&seeds.species_count)),
+                    ],
+                );
+                let (first, count) = batch.splats;
+                for done in (0..count).step_by(MOST_GROUPS as usize) {
+                    pass.push(&push(batch.tiles.0, first + done));
+                    pass.dispatch([(count - done).min(MOST_GROUPS), 1, 1]);
+                }
+                pass.barrier();
+                pass.bind(
+                    &self.resolve,
+                    &[
+                        ("species", Resource::Buffer(&species.table)),
+                        ("tiles", Resource::Buffer(&self.jobs)),
+                        ("sums", Resource::Buffer(&self.sums)),
+                        ("heights", Resource::Texture(&terrain.heights, Sampler::Nearest)),
+                        ("densities", Resource::Texture(&species.densities, Sampler::Nearest)),
+                        ("level_0", Resource::StorageLevel(&self.tiles, 0)),
+                        ("level_1", Resource::StorageLevel(&self.tiles, 1)),
+                        ("level_2", Resource::StorageLevel(&self.tiles, 2)),
+                        ("level_3", Resource::StorageLevel(&self.tiles, 3)),
+                    ],
+                );
+                pass.push(&push(batch.tiles.0, first));
+                pass.dispatch([blocks, blocks, batch.tiles.1]);
+                pass.barrier();
+            }
+        });
+    }
+}
+
+/// Uploads into a buffer, made anew when it is too small.
+fn renew<T: bytemuck::Pod>(gpu: &Gpu, buffer: &mut Buffer, name: &str, content: &[T]) -> Result<()> {
+    let bytes = size_of_val(content) as u64;
+    if bytes > buffer.bytes() {
+        *buffer = gpu.buffer(name, bytes.next_power_of_two())?;
+    }
+    gpu.upload(buffer, 0, content)
+}
