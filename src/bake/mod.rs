@@ -1,11 +1,13 @@
 //! Species to data: z-field views, occlusion, optics; cached on disk by content.
 
 pub mod cache;
+mod file;
 mod occlusion;
 mod optics;
 mod raster;
 mod rays;
 mod surface;
+pub mod tables;
 mod verify;
 mod views;
 
