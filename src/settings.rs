@@ -62,9 +62,6 @@ knobs! {
     view_iterations: u32, "", 1..=4, [1, 2, 3], "fixed-point iterations for the view ray; each costs three texel fetches a fragment";
     light_iterations: u32, "", 0..=2, [1, 1, 2], "iterations for the light ray; 0 leaves out self-shadow and silver lining";
     occlusion_rays: u32, "", 8..=1024, [32, 64, 128], "rays a cell for baked ambient occlusion; bake time";
-    table_angles: u32, "", 4..=32, [12, 16, 16], "nodes of each angle of the forest tables G, T, E; bake time grows with the square";
-    table_densities: u32, "", 2..=16, [6, 8, 8], "nodes of the density of the forest tables; bake time";
-    table_rays: u32, "", 64..=100000, [1200, 2500, 5000], "ground points for the forest tables; bake time, errors fall with the square root";
     samples: u32, "", 1..=8, [4, 4, 8], "samples a pixel (1, 4 or 8, as far as the device goes): levels of opacity; fill cost";
     zfield_min_pixels: f32, "px", 0.25..=64.0, [4.0, 3.0, 2.0], "apparent tree height under which trees are no longer drawn one by one; cost grows with its inverse square";
     zfield_max_trees: u32, "", 1..=16000000, [1000000, 2000000, 4000000], "most trees drawn one by one; bounds memory";
@@ -78,6 +75,9 @@ knobs! {
     hotspot_width: f32, "1/rad", 0.0..=1000.0, [20.0, 20.0, 20.0], "a2 of the leaf-scale hotspot (BN12, eq. 8)";
     ground_contrast: f32, "", 0.0..=4.0, [1.0, 1.0, 1.0], "a3: how much darker the ground is under trees than between them (BN12, eq. 10)";
     hole_radius: f32, "", 0.1..=10.0, [2.0, 2.0, 2.0], "radius of the hole around a tree times the square root of the density (BN12, eq. 9: 2; Poisson points: 0.5)";
+    table_angles: u32, "", 4..=32, [16, 16, 16], "nodes of each angle in the tables of far trees; memory grows with the cube";
+    table_densities: u32, "", 2..=16, [8, 8, 8], "nodes of the density in the tables of far trees; memory";
+    table_rays: u32, "", 32..=1048576, [512, 1024, 8192], "ground points and points on crowns that tables of far trees are measured at; error falls with the root, time grows in proportion";
     memory_mib: u32, "MiB", 16..=1048576, [2048, 2048, 4096], "most device memory a plan may take";
 }
 

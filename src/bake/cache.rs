@@ -1,28 +1,15 @@
-//! Bakes on disk, keyed by content.
-//!
-//! A file holds, little endian: magic, format version, key, the scalars of [`SpeciesBake`], the bytes of every
-//! mip level, and the BLAKE3 of all that. Its size follows from the settings, so nothing in the file is
-//! believed about lengths: a file of another size is not read. Files are written under a name of their own and
-//! renamed when complete, so that two processes at once, or a crash, leave either a whole file or none.
+//! Bakes on disk, keyed by content: the scalars of [`SpeciesBake`], then the bytes of every mip level.
 
-use std::collections::hash_map::RandomState;
-use std::fs::{self, File, OpenOptions};
-use std::hash::{BuildHasher, Hasher};
-use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::file::{Fields, Format, load_or_build};
 use super::{BakeSettings, SpeciesBake, ZField, bake_species, check};
 use crate::Result;
 use crate::physics::views;
 use crate::scene::{Mesh, OpticsOverride};
 
-const MAGIC: [u8; 8] = *b"CANOPYZF";
-/// Goes into the key: to be raised with every change of the format or of what a bake computes.
-const VERSION: u32 = 5;
+const FORMAT: Format = Format { magic: *b"CANOPYZF", version: 5, extension: "zfield" };
 const SCALARS: usize = 17;
-const HEADER: usize = 8 + 4 + 32 + 4 * SCALARS;
-const CHECKSUM: usize = 32;
 
 /// Where a bake came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,42 +44,29 @@ pub fn load_or_bake(
     quiet: bool,
 ) -> Result<(SpeciesBake, CacheState)> {
     check(settings)?;
-    let Some(dir) = cache_dir else {
+    if cache_dir.is_none() {
         return Ok((bake_species(mesh, optics, settings, quiet)?, CacheState::Baked));
-    };
-    let key = key(mesh, optics, settings);
-    let path = path(dir, &key);
-    let state = match read(&path, &key, settings) {
-        Ok(bake) => return Ok((bake, CacheState::Hit)),
-        Err(e) if e.kind() == io::ErrorKind::NotFound => CacheState::Baked,
-        Err(e) => {
-            if !quiet {
-                // Not `eprintln!`, which panics when no one listens any more.
-                let _ = writeln!(io::stderr(), "cache: {}: {e}; baking again", path.display());
-            }
-            CacheState::Rebuilt
-        }
-    };
-    let bake = bake_species(mesh, optics, settings, quiet)?;
-    if let Err(e) = write(dir, &path, &key, &bake) {
-        static WARNED: AtomicBool = AtomicBool::new(false);
-        if !quiet && !WARNED.swap(true, Ordering::Relaxed) {
-            let _ = writeln!(io::stderr(), "cache: cannot write to {}: {e}; going on without", dir.display());
-        }
     }
-    Ok((bake, state))
+    let sizes: Vec<usize> = std::iter::once(4 * SCALARS).chain(level_sizes(settings)).collect();
+    load_or_build(
+        (cache_dir, &FORMAT, &key(mesh, optics, settings)),
+        &sizes,
+        |parts| decode(parts, settings),
+        |bake, put| {
+            put(&scalars(bake).map(f32::to_le_bytes).concat())?;
+            bake.views.levels.iter().try_for_each(|l| put(l))
+        },
+        || bake_species(mesh, optics, settings, quiet),
+        quiet,
+    )
 }
 
 /// BLAKE3 of everything that a bake depends on: geometry, masks and colours, optical overrides, settings and
 /// the version of the bake. Vertex normals and material names have no part in it.
 pub fn key(mesh: &Mesh, optics: &OpticsOverride, settings: &BakeSettings) -> [u8; 32] {
-    let mut h = blake3::Hasher::new_derive_key("canopy species bake");
-    let mut put = |bytes: &[u8]| {
-        // A length before every field, so that no two contents run together to the same bytes.
-        h.update(&(bytes.len() as u64).to_le_bytes());
-        h.update(bytes);
-    };
-    put(&VERSION.to_le_bytes());
+    let mut fields = Fields::new("canopy species bake");
+    let mut put = |bytes: &[u8]| fields.put(bytes);
+    put(&FORMAT.version.to_le_bytes());
     for x in [settings.rings, settings.resolution, settings.occlusion_rays] {
         put(&x.to_le_bytes());
     }
@@ -114,12 +88,12 @@ pub fn key(mesh: &Mesh, optics: &OpticsOverride, settings: &BakeSettings) -> [u8
         put(bytemuck::bytes_of(&size));
         put(rgba);
     }
-    *h.finalize().as_bytes()
+    fields.key()
 }
 
 /// The file of a key.
 pub fn path(dir: &Path, key: &[u8; 32]) -> PathBuf {
-    dir.join(format!("{}.zfield", blake3::Hash::from_bytes(*key).to_hex()))
+    FORMAT.path(dir, key)
 }
 
 fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
@@ -145,17 +119,6 @@ fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
     ]
 }
 
-fn header(key: &[u8; 32], scalars: &[f32; SCALARS]) -> [u8; HEADER] {
-    let mut header = [0; HEADER];
-    header[..8].copy_from_slice(&MAGIC);
-    header[8..12].copy_from_slice(&VERSION.to_le_bytes());
-    header[12..44].copy_from_slice(key);
-    for (to, x) in header[44..].chunks_exact_mut(4).zip(scalars) {
-        to.copy_from_slice(&x.to_le_bytes());
-    }
-    header
-}
-
 /// Bytes of every level, from the settings alone.
 fn level_sizes(settings: &BakeSettings) -> impl Iterator<Item = usize> {
     let views = views::count(settings.rings) as usize;
@@ -163,38 +126,11 @@ fn level_sizes(settings: &BakeSettings) -> impl Iterator<Item = usize> {
     (0..=resolution.ilog2()).map(move |l| views * 4 * (resolution >> l).pow(2))
 }
 
-fn damaged(what: &str) -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidData, what)
-}
-
-fn read(path: &Path, key: &[u8; 32], settings: &BakeSettings) -> io::Result<SpeciesBake> {
-    let mut file = File::open(path)?;
-    let expected = HEADER + level_sizes(settings).sum::<usize>() + CHECKSUM;
-    if file.metadata()?.len() != expected as u64 {
-        return Err(damaged("the cached file has the wrong size"));
-    }
-    let mut hasher = blake3::Hasher::new();
-    let mut bytes = [0; HEADER];
-    file.read_exact(&mut bytes)?;
-    hasher.update(&bytes);
+fn decode(mut parts: Vec<Vec<u8>>, settings: &BakeSettings) -> SpeciesBake {
+    let levels = parts.split_off(1);
     let mut x = [0f32; SCALARS];
-    for (x, from) in x.iter_mut().zip(bytes[44..].as_chunks::<4>().0) {
+    for (x, from) in x.iter_mut().zip(parts[0].as_chunks::<4>().0) {
         *x = f32::from_le_bytes(*from);
-    }
-    if bytes[..44] != header(key, &x)[..44] {
-        return Err(damaged("the cached file is not of this format or content"));
-    }
-    let mut levels = Vec::new();
-    for size in level_sizes(settings) {
-        let mut level = vec![0; size];
-        file.read_exact(&mut level)?;
-        hasher.update(&level);
-        levels.push(level);
-    }
-    let mut checksum = [0; CHECKSUM];
-    file.read_exact(&mut checksum)?;
-    if hasher.finalize() != checksum {
-        return Err(damaged("the cached file is damaged (its checksum differs)"));
     }
     let [
         center,
@@ -215,7 +151,7 @@ fn read(path: &Path, key: &[u8; 32], settings: &BakeSettings) -> io::Result<Spec
         crown_base,
         height,
     ] = x;
-    Ok(SpeciesBake {
+    SpeciesBake {
         views: ZField { n: settings.rings, resolution: settings.resolution, levels },
         center,
         radius,
@@ -228,33 +164,5 @@ fn read(path: &Path, key: &[u8; 32], settings: &BakeSettings) -> io::Result<Spec
         crown_radius,
         crown_base,
         height,
-    })
-}
-
-/// A file that is removed unless it has been renamed.
-struct Temporary(PathBuf);
-
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        // It is gone after the rename, and there is nothing to be done about any other failure.
-        let _ = fs::remove_file(&self.0);
     }
-}
-
-fn write(dir: &Path, path: &Path, key: &[u8; 32], bake: &SpeciesBake) -> io::Result<()> {
-    fs::create_dir_all(dir)?;
-    // A random name: process numbers repeat between containers that share a directory.
-    let mine = format!("tmp-{:016x}", RandomState::new().build_hasher().finish());
-    let temporary = path.with_extension(mine);
-    let mut file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
-    let temporary = Temporary(temporary);
-    let mut hasher = blake3::Hasher::new();
-    let header = header(key, &scalars(bake));
-    for part in std::iter::once(&header[..]).chain(bake.views.levels.iter().map(Vec::as_slice)) {
-        hasher.update(part);
-        file.write_all(part)?;
-    }
-    file.write_all(hasher.finalize().as_bytes())?;
-    file.sync_all()?;
-    fs::rename(&temporary.0, path)
 }

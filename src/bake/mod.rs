@@ -1,13 +1,14 @@
 //! Species to data: z-field views, occlusion, optics; cached on disk by content.
 
 pub mod cache;
+mod file;
 mod occlusion;
 mod optics;
 mod raster;
 mod rays;
 mod scene;
 mod surface;
-mod tables;
+pub mod tables;
 mod verify;
 mod views;
 

@@ -5,6 +5,7 @@ pub mod hash;
 pub mod light;
 pub mod masks;
 pub mod shadow;
+pub mod tables;
 pub mod terrain;
 pub mod tonemap;
 pub mod views;

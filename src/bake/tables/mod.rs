@@ -1,37 +1,138 @@
-//! stub
-use super::{CacheState, SpeciesBake};
-use std::path::Path;
-/// stub
-#[derive(Clone, Debug, PartialEq)]
-pub struct ForestSettings { pub angles: u32, pub densities: u32, pub rays: u32, pub pattern_density: f64, pub scale_range: [f32; 2], pub poisson: bool, pub hole_radius: f32, pub light_iterations: u32, pub view_iterations: u32 }
-/// stub
-#[derive(Clone, Debug, PartialEq)]
-pub struct ForestTables { pub angles: u32, pub densities: u32, pub max_thickness: f32, pub area: f32, pub vertical_scale: f32, pub pair: Vec<[f32; 3]>, pub view: Vec<[f32; 4]>, pub ground: Vec<[f32; 2]> }
-/// stub
-pub fn load_or_measure(b: &SpeciesBake, f: &ForestSettings, _: Option<&Path>, _: bool) -> crate::Result<(ForestTables, CacheState)> {
-    let (n, m) = (f.angles, f.densities);
-    let [a, c] = f.scale_range;
-    let area = b.area * (a * a + a * c + c * c) / 3.0;
-    let max_thickness = f.pattern_density as f32 * area;
-    let mut t = ForestTables { angles: n, densities: m, max_thickness, area, vertical_scale: 2.0 * b.crown_radius / (b.height - b.crown_base), pair: vec![], view: vec![], ground: vec![] };
-    let max = 88f32.to_radians();
-    for j in 0..m {
-        let x = max_thickness * (j as f32 / (m - 1) as f32).powi(2);
-        for v in 0..n {
-            let tv = max * v as f32 / (n - 1) as f32;
-            for l in 0..n {
-                let k0 = (n - 1) / 2;
-                let tl = if l <= k0 { tv - tv * ((k0 - l) as f32 / k0 as f32).powi(2) } else { tv + (max - tv) * ((l - k0) as f32 / (n - 1 - k0) as f32).powi(2) };
-                for p in 0..n {
-                    let phi = std::f32::consts::PI * (p as f32 / (n - 1) as f32).powi(2);
-                    let xi = (tv.cos() * tl.cos() + tv.sin() * tl.sin() * phi.cos()).clamp(-1.0, 1.0).acos();
-                    let w = 1.0 - 0.5 * (-3.0 * xi).exp();
-                    t.pair.push([w, 0.3 + 0.6 * (-3.0 * xi).exp(), 0.02]);
-                }
-            }
-            t.view.push([1.0, 0.5 / (1.0 + x), 0.02, 0.5 * (1.0 - (-x).exp())]);
+//! Tables of a species' forest for the shader-map: G, T, D and E of BN12 §6, measured by casting rays through a forest of
+//! z-field trees. What the tables hold, and between which nodes, is told in [`crate::physics::tables`].
+//!
+//! What is measured is what the near renderer draws, in expectation, so that radiance is the same at any distance: opacity,
+//! depth and sky visibility of the iterated view ray, the light ray's path through the own crown, and the shadow maps' one
+//! look at the back of every other crown.
+
+mod crown;
+mod field;
+mod finish;
+mod measure;
+mod patch;
+mod statistics;
+mod store;
+mod trace;
+
+pub use crown::{Cast, Crown, Seen, Shape};
+pub use field::{FieldAim, FieldCrown};
+pub use store::{key, load_or_measure, path};
+
+use crate::progress::Progress;
+use crate::{Error, Result};
+
+/// Texels a side of the level that rays are cast at: views of it fit the processor's caches, and finer ones change no entry
+/// by more than its standard error (`tests/tables_level.rs`).
+pub const RESOLUTION: u32 = 64;
+/// Most nodes of the density.
+const MOST_DENSITIES: usize = 16;
+
+/// What tables depend on beside the species.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForestSettings {
+    /// Nodes n of each angle.
+    pub angles: u32,
+    /// Nodes m of the density.
+    pub densities: u32,
+    /// Ground points, and points on crowns, that light is cast to.
+    pub rays: u32,
+    /// Full density of the scene's pattern, trees per m².
+    pub pattern_density: f64,
+    /// Range of uniformly distributed scales.
+    pub scale_range: [f32; 2],
+    /// Poisson points (for species with listed positions) instead of the Wang pattern.
+    pub poisson: bool,
+    /// Radius of the hole around a tree times the square root of the density.
+    pub hole_radius: f32,
+    /// Fixed-point iterations for the light ray; 0 leaves out self-shadow.
+    pub light_iterations: u32,
+    /// Fixed-point iterations for the view ray.
+    pub view_iterations: u32,
+}
+
+impl Default for ForestSettings {
+    fn default() -> Self {
+        ForestSettings {
+            angles: 16,
+            densities: 8,
+            rays: 1024,
+            pattern_density: 0.03,
+            scale_range: [1.0; 2],
+            poisson: false,
+            hole_radius: 2.0,
+            light_iterations: 1,
+            view_iterations: 2,
         }
-        t.ground.push([crate::physics::light::ground_visibility(f64::from(x)) as f32, 1.0 - (-x).exp()]);
     }
-    Ok((t, CacheState::Baked))
+}
+
+/// The measured tables; nodes, order and meaning are those of [`crate::physics::tables`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForestTables {
+    /// Nodes n of each angle.
+    pub angles: u32,
+    /// Nodes m of the density.
+    pub densities: u32,
+    /// Largest x = λA.
+    pub max_thickness: f32,
+    /// Mean horizontal tree area A, m².
+    pub area: f32,
+    /// k of S = diag(1, 1, k).
+    pub vertical_scale: f32,
+    /// (W, T_leaf, T_bark).
+    pub pair: Vec<[f32; 3]>,
+    /// Standard errors of (k_g, T_leaf, T_bark).
+    pub pair_stderr: Vec<[f32; 3]>,
+    /// (V, E_leaf, E_bark, Γ_v).
+    pub view: Vec<[f32; 4]>,
+    /// Standard errors of (P, E_leaf, E_bark, Γ_v).
+    pub view_stderr: Vec<[f32; 4]>,
+    /// (D, C).
+    pub ground: Vec<[f32; 2]>,
+    /// Standard errors of (D, C).
+    pub ground_stderr: Vec<[f32; 2]>,
+}
+
+/// Mean horizontal area of a species' trees, m²: A = π `crown_radius`² E[scale²].
+pub fn mean_area(shape: &Shape, [low, high]: [f32; 2]) -> f64 {
+    let (low, high) = (f64::from(low), f64::from(high));
+    let squares = (low * low + low * high + high * high) / 3.0;
+    std::f64::consts::PI * f64::from(shape.crown_radius).powi(2) * squares
+}
+
+/// Refuses settings that nothing can be measured with.
+fn check(forest: &ForestSettings) -> Result<()> {
+    let [low, high] = forest.scale_range;
+    let ok = (4..=64).contains(&forest.angles)
+        && (2..=MOST_DENSITIES as u32).contains(&forest.densities)
+        && (1..=1 << 24).contains(&forest.rays)
+        && (1e-9..=1e3).contains(&forest.pattern_density)
+        && low > 0.0
+        && high >= low
+        && high.is_finite()
+        && forest.hole_radius > 0.0
+        && forest.view_iterations > 0;
+    if ok {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "cannot measure tables with {forest:?}: 4 to 64 angles, 2 to {MOST_DENSITIES} densities, at least one ray, \
+         1e-9 to 1000 trees per m², scales above 0 in order, a hole, at least one iteration of the view ray"
+    )))
+}
+
+/// Measures tables for any crown, on all threads of the current rayon pool; the same bits for any number of them.
+///
+/// # Errors
+/// [`Error::Usage`] for settings out of range.
+pub fn measure<C: Crown>(crown: &C, forest: &ForestSettings, quiet: bool) -> Result<ForestTables> {
+    check(forest)?;
+    let progress =
+        Progress::new("measuring forest", u64::from(forest.angles) * u64::from(forest.angles), quiet);
+    let measured = match forest.densities {
+        ..=8 => measure::measure::<C, 8>(crown, forest, &progress),
+        _ => measure::measure::<C, MOST_DENSITIES>(crown, forest, &progress),
+    };
+    progress.finish();
+    Ok(finish::tables(crown.shape(), forest, &measured))
 }

@@ -1,0 +1,95 @@
+//! What a ray meets in one crown: the shapes that tables can be measured for.
+//!
+//! All is in the scaled space of the tree, the cylinder r ≤ 1, |z| ≤ 1, and rays are parallel. With w the unit vector to
+//! viewer or light there, and right and up as in [`crate::physics::views::Basis`], a ray is the two coordinates (a, b) of
+//! the point a·right + b·up where it meets the plane through the centre across w; depths count from there along w.
+
+use crate::bake::SpeciesBake;
+
+/// Proportions and optics of a tree of scale 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shape {
+    /// Height of the centre of the scaled space, m.
+    pub center: f32,
+    /// Half extent in x and y, m.
+    pub radius: f32,
+    /// Half extent in z, m.
+    pub half_height: f32,
+    /// Half width of the crown, m.
+    pub crown_radius: f32,
+    /// Height of the crown's base, m.
+    pub crown_base: f32,
+    /// Height of the tree, m.
+    pub height: f32,
+    /// Extinction coefficient of the crown, 1/m.
+    pub extinction: f32,
+}
+
+impl Shape {
+    /// The proportions of a baked species.
+    pub fn of(bake: &SpeciesBake) -> Self {
+        Shape {
+            center: bake.center,
+            radius: bake.radius,
+            half_height: bake.half_height,
+            crown_radius: bake.crown_radius,
+            crown_base: bake.crown_base,
+            height: bake.height,
+            extinction: bake.extinction,
+        }
+    }
+
+    /// k of S = diag(1, 1, k): crown diameter over crown height.
+    pub fn vertical_scale(&self) -> f64 {
+        let height = f64::from(self.height);
+        2.0 * f64::from(self.crown_radius) / (height - f64::from(self.crown_base)).max(1e-3 * height)
+    }
+
+    /// Share of bark, in [0, 1], at a height of the scaled space: there is nothing else under the crown.
+    pub fn bark(&self, z: f32) -> f32 {
+        let base = (self.crown_base - self.center) / self.half_height;
+        let t = ((z - (base - 0.05)) / 0.1).clamp(0.0, 1.0);
+        1.0 - t * t * (3.0 - 2.0 * t)
+    }
+}
+
+/// What a viewer sees of a crown on a ray.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// Opacity α_v; with 0 the rest means nothing.
+    pub alpha: f32,
+    /// Depth of p_v along w.
+    pub depth: f32,
+    /// Sky visibility δ_v in the isolated tree.
+    pub occlusion: f32,
+}
+
+/// What a crown casts on a ray of light.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cast {
+    /// Opacity; with 0 the rest means nothing.
+    pub alpha: f32,
+    /// Depth along w of its back, the end away from the sun.
+    pub back: f32,
+}
+
+/// A crown that rays can be cast at.
+pub trait Crown: Sync {
+    /// All that is the same for parallel rays.
+    type Aim: Send + Sync;
+
+    /// The tree's proportions.
+    fn shape(&self) -> &Shape;
+
+    /// Prepares rays along w, by its zenith angle in [0, π/2) and azimuth, rad, in the scaled space.
+    fn aim(&self, zenith: f64, azimuth: f64) -> Self::Aim;
+
+    /// The view ray (a, b).
+    fn seen(&self, aim: &Self::Aim, a: f32, b: f32) -> Seen;
+
+    /// The shadow of the ray of light (a, b).
+    fn cast(&self, aim: &Self::Aim, a: f32, b: f32) -> Cast;
+
+    /// Depth along w at which the ray of light (a, b) enters the crown; `None` where self-shadows are left out.
+    fn entry(&self, aim: &Self::Aim, a: f32, b: f32) -> Option<f32>;
+}

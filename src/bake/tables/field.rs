@@ -1,0 +1,240 @@
+//! Rays against a z-field, fast: the model of [`crate::physics::zfield`] in f32, for parallel rays, with all that depends
+//! on the direction prepared, on a level small enough for the processor's caches.
+
+use std::f32::consts::SQRT_2;
+
+use super::crown::{Cast, Crown, Seen, Shape};
+use crate::bake::SpeciesBake;
+use crate::physics::views::{self, Basis};
+use crate::physics::zfield::AGREEMENT;
+
+/// Shadows fainter than this are not drawn (`shaders/frame/tree_shadow.frag`).
+const FAINTEST: f32 = 1.0 / 64.0;
+
+/// One mip level, with a border of empty texels: outside lies transparent black.
+struct Level {
+    /// Texels a side, without the border.
+    size: f32,
+    /// Texels a row, with the border.
+    stride: usize,
+    /// RGBA8 of all layers.
+    texels: Vec<u32>,
+}
+
+impl Level {
+    fn new(bake: &SpeciesBake, level: usize) -> Self {
+        let level = level.min(bake.views.levels.len() - 1);
+        let size = (bake.views.resolution >> level) as usize;
+        let stride = size + 2;
+        let layers = views::count(bake.views.n) as usize;
+        let mut texels = vec![0; layers * stride * stride];
+        for (row, bytes) in bake.views.levels[level].chunks_exact(4 * size).enumerate() {
+            let (layer, y) = (row / size, row % size);
+            let to = &mut texels[layer * stride * stride + (y + 1) * stride + 1..][..size];
+            for (t, b) in to.iter_mut().zip(bytes.as_chunks::<4>().0) {
+                *t = u32::from_le_bytes(*b);
+            }
+        }
+        Level { size: size as f32, stride, texels }
+    }
+
+    fn layer(&self, layer: u32) -> &[u32] {
+        let size = self.stride * self.stride;
+        &self.texels[layer as usize * size..][..size]
+    }
+
+    /// Bilinear sample of two channels and the opacity, in 1/255.
+    #[inline]
+    fn sample(&self, layer: u32, x: f32, y: f32, first: u32, second: u32) -> [f32; 3] {
+        // Texel centres lie at whole numbers, the border's at 0 and size + 1.
+        let top = self.size + 0.999;
+        let x = (x * self.size + 0.5).clamp(0.0, top);
+        let y = (y * self.size + 0.5).clamp(0.0, top);
+        let (xi, yi) = (x as u32, y as u32);
+        let (fx, fy) = (x - xi as f32, y - yi as f32);
+        let at = yi as usize * self.stride + xi as usize;
+        let texels = &self.layer(layer)[at..at + self.stride + 2];
+        let t = [texels[0], texels[1], texels[self.stride], texels[self.stride + 1]];
+        let weights = [(1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy];
+        let mut sum = [0.0; 3];
+        for (t, w) in t.iter().zip(weights) {
+            sum[0] += w * (t >> first & 255) as f32;
+            sum[1] += w * (t >> second & 255) as f32;
+            sum[2] += w * (t >> 24) as f32;
+        }
+        sum
+    }
+
+    /// The texel at a position, unfiltered; outside, that of the field's border.
+    #[inline]
+    fn nearest(&self, layer: u32, x: f32, y: f32) -> [f32; 3] {
+        let at = |v: f32| (v * self.size).clamp(0.0, self.size - 1.0) as usize + 1;
+        let t = self.layer(layer)[at(y) * self.stride + at(x)];
+        [(t & 255) as f32, (t >> 16 & 255) as f32, (t >> 24) as f32]
+    }
+}
+
+/// One of the three views around a direction: texture coordinates and depth of the point a·right + b·up + s·w, as
+/// coefficients of (a, b, s).
+#[derive(Clone, Copy, Debug)]
+struct Projection {
+    u: [f32; 3],
+    v: [f32; 3],
+    depth: [f32; 3],
+    inverse_depth: f32,
+    weight: f32,
+    layer: u32,
+}
+
+/// The three views around a direction.
+pub struct FieldAim {
+    views: [Projection; 3],
+    /// Depth at which light starts its search, Σ wᵢ dᵢ = 0, as coefficients of (a, b).
+    start: [f32; 2],
+}
+
+/// A z-field to cast rays at.
+pub struct FieldCrown {
+    shape: Shape,
+    rings: u32,
+    border: f64,
+    fine: Level,
+    coarse: Level,
+    magnified: bool,
+    view_iterations: u32,
+    light_iterations: u32,
+}
+
+/// One look into the three views; see [`crate::physics::zfield`].
+#[derive(Clone, Copy)]
+struct Look {
+    s: f32,
+    alpha: f32,
+    occlusion: f32,
+}
+
+impl FieldCrown {
+    /// Prepares the level with at most `resolution` texels a side, and the next.
+    pub fn new(bake: &SpeciesBake, resolution: u32, view_iterations: u32, light_iterations: u32) -> Self {
+        let level = Self::level(bake, resolution);
+        let r = f64::from(bake.views.resolution);
+        FieldCrown {
+            shape: Shape::of(bake),
+            rings: bake.views.n,
+            border: r / (r - 2.0),
+            fine: Level::new(bake, level),
+            coarse: Level::new(bake, level + 1),
+            magnified: level == 0,
+            view_iterations,
+            light_iterations,
+        }
+    }
+
+    /// The mip level with at most `resolution` texels a side.
+    pub fn level(bake: &SpeciesBake, resolution: u32) -> usize {
+        (bake.views.resolution / resolution.max(1)).max(1).ilog2() as usize
+    }
+
+    /// The formula of `look` in [`crate::physics::zfield`], for nearest surfaces.
+    #[inline]
+    fn look(
+        &self,
+        level: &Level,
+        aim: &FieldAim,
+        (a, b, s): (f32, f32, f32),
+        filter: bool,
+        refine: bool,
+    ) -> Look {
+        let (mut sum_k, mut sum_s, mut alpha, mut occlusion) = (0.0, 0.0, 0.0, 0.0);
+        for view in &aim.views {
+            let x = 0.5 + a * view.u[0] + b * view.u[1] + s * view.u[2];
+            let y = 0.5 + a * view.v[0] + b * view.v[1] + s * view.v[2];
+            let t =
+                if filter { level.sample(view.layer, x, y, 0, 16) } else { level.nearest(view.layer, x, y) };
+            let [r, o, t_alpha] = t.map(|t| t * (1.0 / 255.0));
+            let z = SQRT_2 * (2.0 * r - t_alpha);
+            let across = a * view.depth[0] + b * view.depth[1];
+            let mut k = view.weight;
+            if refine && t_alpha > 0.0 {
+                let e = (z / t_alpha - across - s * view.depth[2]) * (1.0 / AGREEMENT as f32);
+                k *= 1.0 - t_alpha * (e * e / (1.0 + e * e));
+            }
+            sum_k += k;
+            alpha += k * t_alpha;
+            occlusion += k * o;
+            sum_s += k * (z - t_alpha * across) * view.inverse_depth;
+        }
+        if alpha <= 0.0 {
+            return Look { s, alpha: 0.0, occlusion: 0.0 };
+        }
+        Look { s: sum_s / alpha, alpha: alpha / sum_k.max(1e-6), occlusion: (occlusion / alpha).min(1.0) }
+    }
+}
+
+impl Crown for FieldCrown {
+    type Aim = FieldAim;
+
+    fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    fn aim(&self, zenith: f64, azimuth: f64) -> FieldAim {
+        let ((st, ct), (sa, ca)) = (zenith.sin_cos(), azimuth.sin_cos());
+        let w = glam::DVec3::new(st * ca, st * sa, ct);
+        // Not the basis of w: at the zenith right and up must still turn with the azimuth.
+        let axes = [glam::DVec3::new(-sa, ca, 0.0), glam::DVec3::new(-ct * ca, -ct * sa, st), w];
+        let lookup = views::lookup(self.rings, w);
+        let mut mean = [0.0; 3];
+        let views = lookup.views.map(|view| {
+            let basis = Basis::new(views::direction(self.rings, view.i, view.j));
+            let along = |axis: glam::DVec3, scale: f64| axes.map(|x| (scale * x.dot(axis)) as f32);
+            for (m, x) in mean.iter_mut().zip(axes) {
+                *m += view.weight * x.dot(basis.w);
+            }
+            Projection {
+                u: along(basis.right, 0.5 / self.border),
+                v: along(basis.up, 0.5 / (self.border * basis.extent)),
+                depth: along(basis.w, 1.0),
+                inverse_depth: (1.0 / w.dot(basis.w)) as f32,
+                weight: view.weight as f32,
+                layer: views::layer(self.rings, view.i, view.j),
+            }
+        });
+        FieldAim { views, start: [-mean[0] / mean[2], -mean[1] / mean[2]].map(|x| x as f32) }
+    }
+
+    #[inline]
+    fn seen(&self, aim: &FieldAim, a: f32, b: f32) -> Seen {
+        let mut s = 0.0;
+        for iteration in 1..self.view_iterations {
+            let found =
+                self.look(&self.coarse, aim, (a, b, s), self.magnified, self.magnified && iteration > 1);
+            s += (found.s - s) * (24.0 * found.alpha).min(1.0);
+        }
+        let found = self.look(&self.fine, aim, (a, b, s), true, self.view_iterations > 1);
+        Seen { alpha: found.alpha, depth: found.s, occlusion: found.occlusion }
+    }
+
+    #[inline]
+    fn cast(&self, aim: &FieldAim, a: f32, b: f32) -> Cast {
+        let (mut sum_s, mut alpha) = (0.0, 0.0);
+        for view in &aim.views {
+            let x = 0.5 + a * view.u[0] + b * view.u[1];
+            let y = 0.5 + a * view.v[0] + b * view.v[1];
+            let [_, g, t_alpha] = self.fine.sample(view.layer, x, y, 0, 8).map(|t| t * (1.0 / 255.0));
+            let across = a * view.depth[0] + b * view.depth[1];
+            alpha += view.weight * t_alpha;
+            sum_s += view.weight * (SQRT_2 * (2.0 * g - t_alpha) - t_alpha * across) * view.inverse_depth;
+        }
+        if alpha < FAINTEST { Cast::default() } else { Cast { alpha: alpha.min(1.0), back: sum_s / alpha } }
+    }
+
+    #[inline]
+    fn entry(&self, aim: &FieldAim, a: f32, b: f32) -> Option<f32> {
+        let mut s = a * aim.start[0] + b * aim.start[1];
+        for iteration in 0..self.light_iterations {
+            s = self.look(&self.fine, aim, (a, b, s), true, iteration > 0).s;
+        }
+        (self.light_iterations > 0).then_some(s)
+    }
+}

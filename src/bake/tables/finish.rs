@@ -1,0 +1,106 @@
+//! From estimates to tables: logarithms, and what theory says of them.
+
+use super::crown::Shape;
+use super::measure::{Estimate, Measured, PairEstimate};
+use super::{ForestSettings, ForestTables, mean_area};
+use crate::physics::tables::{density_node, light_node, secant, zenith_node};
+
+/// A transmittance counts as measured when it is this many times its standard error.
+const SIGNIFICANT: f64 = 4.0;
+
+/// −ln of a transmittance at every density, from estimates of which the first is the limit of −ln/q.
+///
+/// Optical thickness never falls with the density, nor below `least`. Where the transmittance drowns in its error, it goes on
+/// in proportion to the density from the last node that does not: the logarithm of noise would be worse.
+fn thickness(estimates: &[Estimate], nodes: &[f64], least: &[f64]) -> Vec<f64> {
+    let max = nodes[nodes.len() - 1];
+    // Per density, so that the first node has a value.
+    let mut slope = (estimates[0].0 / max).max(least[0]).max(1e-6);
+    let mut all = vec![slope];
+    let mut noise = false;
+    for (j, &x) in nodes.iter().enumerate().skip(1) {
+        let (mean, error) = estimates[j];
+        noise |= mean <= SIGNIFICANT * error || mean <= 0.0;
+        let measured = if noise { slope * x } else { -mean.ln() };
+        let before = all[j - 1] * nodes[j - 1];
+        slope = measured.max(before).max(least[j] * x) / x;
+        all.push(slope);
+    }
+    all
+}
+
+/// Makes the tables.
+pub fn tables(shape: &Shape, forest: &ForestSettings, measured: &Measured) -> ForestTables {
+    let (n, m) = (forest.angles as usize, forest.densities as usize);
+    let area = mean_area(shape, forest.scale_range);
+    let max_thickness = forest.pattern_density * area;
+    let nodes: Vec<f64> = (0..m).map(|j| density_node(m, j, max_thickness)).collect();
+    let none = vec![0.0; m];
+    let mut t = ForestTables {
+        angles: forest.angles,
+        densities: forest.densities,
+        max_thickness: max_thickness as f32,
+        area: area as f32,
+        vertical_scale: shape.vertical_scale() as f32,
+        pair: vec![[0.0; 3]; m * n * n * n],
+        pair_stderr: vec![[0.0; 3]; m * n * n * n],
+        view: vec![[0.0; 4]; m * n],
+        view_stderr: vec![[0.0; 4]; m * n],
+        ground: measured.ground.iter().map(|g| g.map(|e| e.0.clamp(0.0, 1.0) as f32)).collect(),
+        ground_stderr: measured.ground.iter().map(|g| g.map(|e| e.1 as f32)).collect(),
+    };
+    for v in 0..n {
+        let theta_v = zenith_node(n, v);
+        let views = &measured.view[v * m..][..m];
+        let path: Vec<Estimate> = views.iter().map(|e| e.ground).collect();
+        let path = thickness(&path, &nodes, &none);
+        for (x, e) in views.iter().enumerate() {
+            let share = |e: Estimate| e.0.clamp(0.0, 1.0) as f32;
+            let value = (path[x] / secant(theta_v)) as f32;
+            t.view[x * n + v] = [value, share(e.leaf), share(e.bark), share(e.coverage)];
+            let ground = if x == 0 { 0.0 } else { e.ground.1 };
+            t.view_stderr[x * n + v] = [ground, e.leaf.1, e.bark.1, e.coverage.1].map(|e| e as f32);
+        }
+        for l in 0..n {
+            let theta_l = light_node(n, l, theta_v);
+            let mut estimates = measured.pair[(v * n + l) * m * n..][..m * n].to_vec();
+            if theta_v == 0.0 || theta_l == 0.0 {
+                estimates.chunks_exact_mut(n).for_each(isotropic);
+            }
+            let lit: Vec<Estimate> = (0..m).map(|x| (estimates[x * n].lit, 0.0)).collect();
+            let lit = thickness(&lit, &nodes, &none);
+            // No more is visible and lit than is visible, or than is lit.
+            let least: Vec<f64> = path.iter().zip(&lit).map(|(p, l)| p.max(*l)).collect();
+            for k in 0..n {
+                let joint: Vec<Estimate> = (0..m).map(|x| estimates[x * n + k].ground).collect();
+                let joint = thickness(&joint, &nodes, &least);
+                for x in 0..m {
+                    let e = &estimates[x * n + k];
+                    let at = ((x * n + v) * n + l) * n + k;
+                    let leaf = e.leaf.0.clamp(0.0, 1.0);
+                    let w = joint[x] / (secant(theta_v) + secant(theta_l));
+                    t.pair[at] = [w, leaf, e.bark.0.clamp(0.0, 1.0 - leaf)].map(|v| v as f32);
+                    let ground = if x == 0 { 0.0 } else { e.ground.1 };
+                    t.pair_stderr[at] = [ground, e.leaf.1, e.bark.1].map(|e| e as f32);
+                }
+            }
+        }
+    }
+    t
+}
+
+/// Where view or light is vertical nothing depends on φ: the mean over it, with the largest error of one.
+fn isotropic(row: &mut [PairEstimate]) {
+    let count = row.len() as f64;
+    let mean = |of: fn(&PairEstimate) -> Estimate| {
+        let (sum, error) = row.iter().map(of).fold((0.0, 0.0), |s: Estimate, e| (s.0 + e.0, s.1.max(e.1)));
+        (sum / count, error)
+    };
+    let same = PairEstimate {
+        ground: mean(|e| e.ground),
+        lit: row[0].lit,
+        leaf: mean(|e| e.leaf),
+        bark: mean(|e| e.bark),
+    };
+    row.fill(same);
+}

@@ -1,0 +1,325 @@
+//! Rays through a patch: what a viewer sees on them, and what light they bring.
+//!
+//! Trees are active with probability q = Λ / pattern density each, independently. Given the full pattern, expectations over
+//! that thinning are exact products, for all densities from the same crowns: with opacities α_j on a view ray and α'_m on a
+//! ray of light, E[∏ (1−α_j) ∏ (1−α'_m)] = ∏ (1 − q c), c = α for a crown on one ray and α + α' − αα' for one on both.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use super::crown::Crown;
+use super::patch::{Patch, Segment, TURNS, Tree};
+
+/// A direction of parallel rays: their slope in metres and in the scaled space of the tree.
+pub struct Heading<A> {
+    /// sin and cos of the zenith angle in metres.
+    sine: f32,
+    cosine: f32,
+    /// The same of the unit vector w of the tree's scaled space.
+    scaled: [f32; 2],
+    /// Length of S⁻¹ v: depth in the scaled space a metre along the ray, for a tree of scale 1.
+    depth_per_metre: f32,
+    /// By azimuth in [`TURNS`] steps.
+    aims: Vec<A>,
+}
+
+impl<A> Heading<A> {
+    /// Rays at a zenith angle θ < 90°, rad, in the space scaled vertically by `vertical_scale`.
+    pub fn new<C: Crown<Aim = A>>(crown: &C, theta: f64, vertical_scale: f64) -> Self {
+        let zenith = (vertical_scale * theta.sin()).atan2(theta.cos());
+        let tree_zenith = Self::tree_zenith(crown, zenith);
+        let aims =
+            (0..TURNS).map(|k| crown.aim(tree_zenith, TAU * f64::from(k) / f64::from(TURNS))).collect();
+        Self::with(crown, zenith, aims)
+    }
+
+    /// A single ray at a zenith angle in metres, rad, with the azimuth that trees see it from.
+    pub fn single<C: Crown<Aim = A>>(crown: &C, zenith: f64) -> Self {
+        Self::with(crown, zenith.min(FRAC_PI_2 - 0.01), Vec::new())
+    }
+
+    fn tree_zenith<C: Crown<Aim = A>>(crown: &C, zenith: f64) -> f64 {
+        let shape = crown.shape();
+        (zenith.sin() / f64::from(shape.radius)).atan2(zenith.cos() / f64::from(shape.half_height))
+    }
+
+    fn with<C: Crown<Aim = A>>(crown: &C, zenith: f64, aims: Vec<A>) -> Self {
+        let shape = crown.shape();
+        let (x, z) = (zenith.sin() / f64::from(shape.radius), zenith.cos() / f64::from(shape.half_height));
+        let (scaled_sine, scaled_cosine) = Self::tree_zenith(crown, zenith).sin_cos();
+        Heading {
+            sine: zenith.sin() as f32,
+            cosine: zenith.cos() as f32,
+            scaled: [scaled_sine as f32, scaled_cosine as f32],
+            depth_per_metre: x.hypot(z) as f32,
+            aims,
+        }
+    }
+
+    /// sin and cos of the zenith angle in metres.
+    pub fn sine_cosine(&self) -> [f32; 2] {
+        [self.sine, self.cosine]
+    }
+
+    /// Half extents of a crown's box across the ray: |a| ≤ 1, |b| ≤ sin + cos.
+    pub fn extent(&self) -> f32 {
+        self.scaled[0] + self.scaled[1]
+    }
+
+    /// Where a tree's ray (a, b) leaves the ground: along and across the heading from the trunk, m.
+    pub fn ground<C: Crown<Aim = A>>(&self, crown: &C, scale: f32, a: f32, b: f32) -> [f32; 2] {
+        let shape = crown.shape();
+        let [s, c] = self.scaled;
+        [-(b + s * shape.center / shape.half_height) * shape.radius * scale / c, a * shape.radius * scale]
+    }
+}
+
+/// An azimuth: in steps of a turn, and as a unit vector.
+#[derive(Clone, Copy, Debug)]
+pub struct Azimuth {
+    /// Nearest step.
+    pub step: u32,
+    /// Unit vector.
+    pub along: [f32; 2],
+}
+
+impl Azimuth {
+    /// Of an angle, rad.
+    pub fn new(angle: f64) -> Self {
+        let (s, c) = angle.sin_cos();
+        let step = (angle / TAU * f64::from(TURNS)).round().rem_euclid(f64::from(TURNS)) as u32;
+        Azimuth { step, along: [c as f32, s as f32] }
+    }
+}
+
+/// A crown's box on a ray.
+struct Met {
+    a: f32,
+    b: f32,
+    /// Depth of the ray's origin along w.
+    depth: f32,
+    /// Metres along the ray for a unit of depth.
+    metres: f32,
+    /// Azimuth that the tree sees the ray from.
+    step: u32,
+}
+
+/// The ray's coordinates at a tree, `offset` being from the trunk to the origin at height `z`; `None` where it misses the box.
+#[inline]
+fn at_tree<C: Crown>(
+    crown: &C,
+    heading: &Heading<C::Aim>,
+    azimuth: &Azimuth,
+    tree: &Tree,
+    offset: [f32; 2],
+    z: f32,
+) -> Option<Met> {
+    let shape = crown.shape();
+    let [ca, sa] = azimuth.along;
+    let across = offset[1] * ca - offset[0] * sa;
+    if across.abs() >= shape.radius * tree.scale {
+        return None;
+    }
+    let inverse = 1.0 / (tree.scale * shape.radius);
+    let horizontal = (offset[0] * ca + offset[1] * sa) * inverse;
+    let vertical = (z / tree.scale - shape.center) / shape.half_height;
+    let [s, c] = heading.scaled;
+    let b = s * vertical - c * horizontal;
+    (b.abs() < s + c).then(|| Met {
+        a: across * inverse,
+        b,
+        depth: s * horizontal + c * vertical,
+        metres: tree.scale / heading.depth_per_metre,
+        step: (azimuth.step + TURNS - tree.turn) & (TURNS - 1),
+    })
+}
+
+/// A crown on a view ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Number of the tree.
+    pub tree: u32,
+    /// Opacity.
+    pub alpha: f32,
+    /// Metres from the ground to p_v.
+    pub metres: f32,
+    /// Height of p_v in the scaled space of the tree.
+    pub height: f32,
+    /// Sky visibility δ_v.
+    pub occlusion: f32,
+}
+
+/// Half the corridor's width, m.
+fn reach<C: Crown>(crown: &C, largest: f32) -> f32 {
+    crown.shape().radius * largest
+}
+
+/// Where a ray from height `z` has passed above every tree, m along the ground.
+fn length<C: Crown>(crown: &C, heading: &Heading<C::Aim>, z: f32, largest: f32) -> f32 {
+    let top = (crown.shape().center + crown.shape().half_height) * largest;
+    (top - z).max(0.0) * heading.sine / heading.cosine
+}
+
+/// The ray from a ground point to the viewer: `hits` from the viewer's end on, and `boxes`, the sum of 1/scale² of the trees
+/// whose boxes it passes.
+pub fn view<C: Crown>(
+    crown: &C,
+    patch: &Patch,
+    heading: &Heading<C::Aim>,
+    azimuth: &Azimuth,
+    origin: [f32; 2],
+    largest: f32,
+    hits: &mut Vec<Hit>,
+) -> f32 {
+    hits.clear();
+    let mut boxes = 0.0;
+    let segment = Segment {
+        origin,
+        along: azimuth.along,
+        length: length(crown, heading, 0.0, largest),
+        reach: reach(crown, largest),
+    };
+    let [s, c] = heading.scaled;
+    // A heading for one ray only: its aims are made as trees are met.
+    let once = heading.aims.is_empty().then(|| f64::from(s.atan2(c)));
+    patch.visit(&segment, |tree, offset| {
+        let Some(met) = at_tree(crown, heading, azimuth, tree, offset, 0.0) else { return };
+        boxes += 1.0 / (tree.scale * tree.scale);
+        let seen = if let Some(zenith) = once {
+            let aim = crown.aim(zenith, TAU * f64::from(met.step) / f64::from(TURNS));
+            crown.seen(&aim, met.a, met.b)
+        } else {
+            crown.seen(&heading.aims[met.step as usize], met.a, met.b)
+        };
+        let metres = (seen.depth - met.depth) * met.metres;
+        // What lies under the ground is not seen.
+        if seen.alpha > 0.0 && metres > 0.0 {
+            hits.push(Hit {
+                tree: tree.index,
+                alpha: seen.alpha.min(1.0),
+                metres,
+                height: met.b * s + seen.depth * c,
+                occlusion: seen.occlusion,
+            });
+        }
+    });
+    hits.sort_by(|a, b| b.metres.total_cmp(&a.metres));
+    boxes
+}
+
+/// Opacities of the crowns in front of a point, by tree; forgotten all at once.
+pub struct Marks {
+    epoch: u32,
+    of_tree: Vec<(u32, f32)>,
+}
+
+impl Marks {
+    /// For patches of up to `trees` trees.
+    pub fn new(trees: usize) -> Self {
+        Marks { epoch: 0, of_tree: vec![(0, 0.0); trees] }
+    }
+
+    /// Replaces all marks.
+    pub fn set(&mut self, front: &[(u32, f32)]) {
+        self.epoch += 1;
+        for &(tree, alpha) in front {
+            self.of_tree[tree as usize] = (self.epoch, alpha);
+        }
+    }
+
+    #[inline]
+    fn get(&self, tree: u32) -> Option<f32> {
+        let (epoch, alpha) = self.of_tree[tree as usize];
+        (epoch == self.epoch).then_some(alpha)
+    }
+}
+
+/// A point that light comes to.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// Horizontal position, m.
+    pub position: [f32; 2],
+    /// Height above the ground, m.
+    pub z: f32,
+    /// The tree that it is on.
+    pub tree: Option<Tree>,
+}
+
+/// Light on a ray, at every density.
+#[derive(Clone, Copy, Debug)]
+pub struct Light<const M: usize> {
+    /// ∏ (1 − q α') over the crowns on it.
+    pub alone: [f32; M],
+    /// ∏ of (1 − q c)/(1 − q α) for marked crowns, 1 − q α' for others: times the view ray's ∏ (1 − q α), the joint product.
+    pub joint: [f32; M],
+    /// Σ α', and Σ α α' over marked crowns: the products' first orders.
+    pub sum: f32,
+    pub overlap: f32,
+    /// What the receiver's own tree leaves of it.
+    pub own: f32,
+}
+
+/// The ray of light to a receiver. Its own tree takes exp(−τ s/scale) over the metres s to where the ray enters it; others
+/// shadow it if their back lies nearer the sun than that (`shaders/frame/tree_shade.glsl`).
+#[inline]
+pub fn light<C: Crown, const M: usize>(
+    crown: &C,
+    patch: &Patch,
+    heading: &Heading<C::Aim>,
+    azimuth: &Azimuth,
+    (receiver, marks): (&Receiver, &Marks),
+    q: &[f32; M],
+    largest: f32,
+) -> Light<M> {
+    let mut light = Light { alone: [1.0; M], joint: [1.0; M], sum: 0.0, overlap: 0.0, own: 1.0 };
+    let (mut entry, mut own) = (0.0, u32::MAX);
+    if let Some(tree) = &receiver.tree {
+        own = tree.index;
+        // Across the torus the point may lie near another image of its tree.
+        let offset = [0, 1].map(|k| {
+            let d = receiver.position[k] - tree.position[k];
+            d - (d / patch.side).round() * patch.side
+        });
+        if let Some(met) = at_tree(crown, heading, azimuth, tree, offset, receiver.z)
+            && let Some(depth) = crown.entry(&heading.aims[met.step as usize], met.a, met.b)
+        {
+            entry = ((depth - met.depth) * met.metres).max(0.0);
+            light.own = (-crown.shape().extinction / tree.scale * entry).exp();
+        }
+    }
+    let segment = Segment {
+        origin: receiver.position,
+        along: azimuth.along,
+        length: length(crown, heading, receiver.z, largest),
+        reach: reach(crown, largest),
+    };
+    patch.visit(&segment, |tree, offset| {
+        if tree.index == own {
+            return;
+        }
+        let Some(met) = at_tree(crown, heading, azimuth, tree, offset, receiver.z) else { return };
+        let cast = crown.cast(&heading.aims[met.step as usize], met.a, met.b);
+        if cast.alpha <= 0.0 || (cast.back - met.depth) * met.metres <= entry {
+            return;
+        }
+        light.sum += cast.alpha;
+        for (a, q) in light.alone.iter_mut().zip(q) {
+            *a *= 1.0 - q * cast.alpha;
+        }
+        match marks.get(tree.index) {
+            Some(alpha) => {
+                light.overlap += alpha * cast.alpha;
+                let both = alpha + cast.alpha - alpha * cast.alpha;
+                for (j, q) in light.joint.iter_mut().zip(q) {
+                    // Where both factors are 0 the product with the view ray's is 0 anyway.
+                    *j *= (1.0 - q * both) / (1.0 - q * alpha).max(1e-6);
+                }
+            }
+            None => {
+                for (j, q) in light.joint.iter_mut().zip(q) {
+                    *j *= 1.0 - q * cast.alpha;
+                }
+            }
+        }
+    });
+    light
+}

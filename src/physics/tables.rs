@@ -1,0 +1,181 @@
+//! Tables of a species' forest (G, T, D, E of BN12 §6): coordinates of their nodes, and lookups between them.
+//!
+//! # Angles
+//! BN12 measures in a space scaled vertically so that crowns are as high as wide: S = diag(1, 1, k), with
+//! k = `vertical_scale` = crown diameter / crown height. θ_v and θ_l are the zenith angles of S v and S l, v and l being
+//! unit vectors from the level ground to viewer and light; φ in [0, π] is the azimuth between them, 0 where v = l. Only the
+//! labels live in the scaled space: rays are cast in metres, along S⁻¹ of the scaled direction.
+//!
+//! # Density
+//! x = λA: trees per m², times their mean horizontal area A = π `crown_radius`² E[scale²].
+//!
+//! # Nodes
+//! n = `angles` and m = `densities` of them:
+//! - θ_i = θ_max i/(n−1), θ_max = 88°;
+//! - θ_l relative to θ_v, so that the hotspot's ridge v = l is a grid line and has fine cells about it. With
+//!   k₀ = ⌊(n−1)/2⌋: node j ≤ k₀ is θ_v − θ_v t², t = (k₀−j)/k₀; node j > k₀ is θ_v + (θ_max − θ_v) t²,
+//!   t = (j−k₀)/(n−1−k₀);
+//! - φ_k = π (k/(n−1))²;
+//! - x_j = x_max (j/(m−1))².
+//!
+//! # Values
+//! - pair, index ((x·n + v)·n + l)·n + φ: (W, T_leaf, T_bark). The probability that a ground point is visible and lit is
+//!   k_g = exp(−x (sec θ_v + sec θ_l) W); at x = 0, W is the limit. For opaque Poisson spheres W is 1/2 on the ridge and
+//!   nears 1 far from it. T = T_leaf + T_bark is the mean over what is visible of trees of the sun that arrives there
+//!   (BN12 eq. 16), split by the share of bark under the crown.
+//! - view, index x·n + v: (V, E_leaf, E_bark, Γ_v). Visible ground is P = k_g + k_ḡ = exp(−x sec θ_v V). E = E_leaf + E_bark
+//!   is the mean of δ/(1 + d²Λ/r²) over what is visible of trees (BN12 eq. 21); Γ_v is the mean coverage by crown discs at
+//!   visible ground points.
+//! - ground, index x: (D, C), the ground's mean sky visibility (BN12 eq. 18, level) and its mean coverage by discs.
+//!
+//! Logarithms per optical path are stored, not probabilities, because they hardly vary: what is interpolated is nearly
+//! constant, and beyond x_max, where the last node holds, optical thickness still grows as x.
+
+use std::f64::consts::PI;
+
+use crate::bake::tables::ForestTables;
+
+/// Largest zenith angle of a node, rad: 88°.
+pub const THETA_MAX: f64 = 88.0 * PI / 180.0;
+
+/// Node i of the zenith angle of the view, rad.
+pub fn zenith_node(n: usize, i: usize) -> f64 {
+    THETA_MAX * i as f64 / (n - 1) as f64
+}
+
+/// Index of the node of the light's zenith angle that equals the view's.
+pub fn ridge(n: usize) -> usize {
+    (n - 1) / 2
+}
+
+/// Node j of the zenith angle of the light, rad, for a view at zenith angle `theta_v` in [0, θ_max].
+pub fn light_node(n: usize, j: usize, theta_v: f64) -> f64 {
+    let k0 = ridge(n);
+    if j <= k0 {
+        let t = (k0 - j) as f64 / k0 as f64;
+        theta_v - theta_v * t * t
+    } else {
+        let t = (j - k0) as f64 / (n - 1 - k0) as f64;
+        theta_v + (THETA_MAX - theta_v) * t * t
+    }
+}
+
+/// Node k of the azimuth between view and light, rad.
+pub fn azimuth_node(n: usize, k: usize) -> f64 {
+    let t = k as f64 / (n - 1) as f64;
+    PI * t * t
+}
+
+/// Node j of the density x = λA.
+pub fn density_node(m: usize, j: usize, max_thickness: f64) -> f64 {
+    let t = j as f64 / (m - 1) as f64;
+    max_thickness * t * t
+}
+
+/// Clamps, NaN to the lower bound: lookups must be finite for every input.
+fn within(x: f64, low: f64, high: f64) -> f64 {
+    x.max(low).min(high)
+}
+
+/// Coordinate of the view's zenith angle among its nodes, in [0, n−1]; inverse of [`zenith_node`].
+pub fn zenith_coordinate(n: usize, theta_v: f64) -> f64 {
+    within(theta_v, 0.0, THETA_MAX) / THETA_MAX * (n - 1) as f64
+}
+
+/// Coordinate of the light's zenith angle among its nodes, in [0, n−1]; inverse of [`light_node`]. Where all nodes of a side
+/// are one angle (θ_v = 0, θ_v = θ_max), the ridge.
+pub fn light_coordinate(n: usize, theta_v: f64, theta_l: f64) -> f64 {
+    let (v, l) = (within(theta_v, 0.0, THETA_MAX), within(theta_l, 0.0, THETA_MAX));
+    let k0 = ridge(n) as f64;
+    // t² = |θ_l − θ_v| / (room on that side).
+    if l < v {
+        k0 - k0 * ((v - l) / v).min(1.0).sqrt()
+    } else if l > v {
+        k0 + ((n - 1) as f64 - k0) * ((l - v) / (THETA_MAX - v)).min(1.0).sqrt()
+    } else {
+        k0
+    }
+}
+
+/// Coordinate of the azimuth among its nodes, in [0, n−1]; inverse of [`azimuth_node`].
+pub fn azimuth_coordinate(n: usize, phi: f64) -> f64 {
+    (within(phi.abs(), 0.0, PI) / PI).sqrt() * (n - 1) as f64
+}
+
+/// Coordinate of the density among its nodes, in [0, m−1]; inverse of [`density_node`].
+pub fn density_coordinate(m: usize, max_thickness: f64, x: f64) -> f64 {
+    (within(x, 0.0, max_thickness) / max_thickness).sqrt() * (m - 1) as f64
+}
+
+/// sec θ, at most 1000.
+pub fn secant(theta: f64) -> f64 {
+    1.0 / theta.cos().max(1e-3)
+}
+
+/// (θ_v, θ_l, φ) of unit vectors from the level ground to viewer and light, in the space scaled by `vertical_scale`. Where
+/// either is vertical φ is 0: nothing depends on it there.
+pub fn angles(v: [f64; 3], l: [f64; 3], vertical_scale: f64) -> (f64, f64, f64) {
+    let zenith = |w: [f64; 3]| w[0].hypot(w[1]).atan2(vertical_scale * w[2]);
+    let (cross, dot) = (v[0] * l[1] - v[1] * l[0], v[0] * l[0] + v[1] * l[1]);
+    // atan2(0, 0) = 0 where either is vertical.
+    (zenith(v), zenith(l), cross.abs().atan2(dot))
+}
+
+/// The two nodes around a coordinate, and the weight of the second.
+fn cell(coordinate: f64, count: usize) -> (usize, f64) {
+    let first = (coordinate as usize).min(count - 2);
+    (first, coordinate - first as f64)
+}
+
+/// (W, T_leaf, T_bark) between the nodes: linear in the four coordinates.
+pub fn pair(t: &ForestTables, theta_v: f64, theta_l: f64, phi: f64, x: f64) -> [f64; 3] {
+    let (n, m) = (t.angles as usize, t.densities as usize);
+    let axes = [
+        cell(density_coordinate(m, f64::from(t.max_thickness), x), m),
+        cell(zenith_coordinate(n, theta_v), n),
+        cell(light_coordinate(n, theta_v, theta_l), n),
+        cell(azimuth_coordinate(n, phi), n),
+    ];
+    let mut sum = [0.0; 3];
+    for corner in 0..16 {
+        let (mut index, mut weight) = (0, 1.0);
+        for (axis, &(first, f)) in axes.iter().enumerate() {
+            let second = corner >> axis & 1;
+            index = index * if axis == 0 { 1 } else { n } + first + second;
+            weight *= if second == 1 { f } else { 1.0 - f };
+        }
+        for (s, value) in sum.iter_mut().zip(t.pair[index]) {
+            *s += weight * f64::from(value);
+        }
+    }
+    sum
+}
+
+/// (V, E_leaf, E_bark, Γ_v) between the nodes: linear in the two coordinates.
+pub fn view(t: &ForestTables, theta_v: f64, x: f64) -> [f64; 4] {
+    let (n, m) = (t.angles as usize, t.densities as usize);
+    let (xi, xf) = cell(density_coordinate(m, f64::from(t.max_thickness), x), m);
+    let (vi, vf) = cell(zenith_coordinate(n, theta_v), n);
+    let at = |x: usize, v: usize, c: usize| f64::from(t.view[x * n + v][c]);
+    let along = |x: usize, c: usize| at(x, vi, c) * (1.0 - vf) + at(x, vi + 1, c) * vf;
+    std::array::from_fn(|c| along(xi, c) * (1.0 - xf) + along(xi + 1, c) * xf)
+}
+
+/// (D, C) between the nodes: linear in the coordinate.
+pub fn ground(t: &ForestTables, x: f64) -> [f64; 2] {
+    let m = t.densities as usize;
+    let (i, f) = cell(density_coordinate(m, f64::from(t.max_thickness), x), m);
+    std::array::from_fn(|c| f64::from(t.ground[i][c]) * (1.0 - f) + f64::from(t.ground[i + 1][c]) * f)
+}
+
+/// P = k_g + k_ḡ = exp(−x sec θ_v V): share of the ground that is visible.
+pub fn visible_ground(t: &ForestTables, theta_v: f64, x: f64) -> f64 {
+    (-x.max(0.0) * secant(theta_v) * view(t, theta_v, x)[0]).exp()
+}
+
+/// k_g = exp(−x (sec θ_v + sec θ_l) W): share of the ground that is visible and lit; at most P.
+pub fn joint_ground(t: &ForestTables, theta_v: f64, theta_l: f64, phi: f64, x: f64) -> f64 {
+    let w = pair(t, theta_v, theta_l, phi, x)[0];
+    // At nodes W is bounded by V; between them, where both are interpolated, not to the last bit.
+    (-x.max(0.0) * (secant(theta_v) + secant(theta_l)) * w).exp().min(visible_ground(t, theta_v, x))
+}
