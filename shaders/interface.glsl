@@ -33,12 +33,14 @@ struct View {
     vec3 sky_radiance;                // mean over the upper hemisphere, times the exposure scale
     float camera_height;              // z of the camera in the terrain's system, m
     float pixels_at_1m;               // pixels that one metre covers at one metre
+    float footprint;                  // log2 of the pixel's size over the distance between pixels: 0 but for sparse images
     ivec2 grid_camera;                // camera's cell of the terrain's finest grid
     vec2 grid_offset;                 // camera's position in that cell, m
     vec2 quad_offset;                 // camera's position in that quad, m
     float hotspot_amplitude;          // a1 of BN12 eq. 8
     float hotspot_width;              // a2 of BN12 eq. 8, 1/rad
     float ground_contrast;            // a3 of BN12 eq. 10
+    float convergence;                // distance over the range from which light is the average, BN12 eq. 22-25
     float hole_radius;                // radius of the hole around a tree times sqrt(density), BN12 eq. 9
 };
 
@@ -149,6 +151,7 @@ struct Tree {
     float own;                        // 1 - nu: weight of the tree's own light
     vec3 mean_sky;                    // average radiance from the sky, times nu
     float mean_lit;                   // average k_t / (k_t + k_t-bar), times nu
+    vec2 canopy;                      // change of depth along the axes of its cascade, of a plane parallel to the ground
 };
 
 // An indexed indirect draw.

@@ -8,7 +8,6 @@ use crate::forest::species::density_map_size;
 use crate::frame::camera::Eye;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
-use crate::physics::handover::CONVERGED;
 use crate::physics::light::sun_disc_fraction;
 use crate::physics::views;
 use crate::scene::{Albedo, Camera, Distribution, Scene, Sky};
@@ -202,7 +201,7 @@ impl Plan {
         let diagonal = scene.terrain.extent[0].hypot(scene.terrain.extent[1]);
         plan.shadow_distance = match f64::from(s.shadow_distance) {
             // Farther out the average light includes its shadows.
-            0.0 if plan.range > 0.0 => (CONVERGED * plan.range).min(diagonal + eye.position[2].abs()),
+            0.0 if plan.range > 0.0 => (f64::from(s.convergence) * plan.range).min(diagonal + eye.position[2].abs()),
             0.0 => diagonal,
             chosen => chosen,
         };
@@ -245,7 +244,7 @@ impl Plan {
         // apart differ by less than a pixel under about eleven pixels: sin 10 degrees of half the size.
         let widest = 2.0 * self.tallest * eye.pixels_at_1m;
         let near = widest * std::f64::consts::SQRT_2 / f64::from(s.view_resolution);
-        self.draw_limits = [near, widest / 11.0, (CONVERGED * self.range).max(widest / 11.0)];
+        self.draw_limits = [near, widest / 11.0, (f64::from(s.convergence) * self.range).max(widest / 11.0)];
         if area_density <= 0.0 {
             self.range = 0.0;
             return;
@@ -394,7 +393,7 @@ impl Plan {
                 "target",
                 "shadow cascades",
                 format!("the sun is up: {} cascades to {:.0} m", self.cascades, self.shadow_distance),
-                u64::from(self.cascades) * u64::from(s.cascade_size).pow(2) * 8,
+                u64::from(self.cascades) * u64::from(s.cascade_size).pow(2) * 4,
             );
         }
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);

@@ -8,6 +8,7 @@
 #include "physics/light.glsl"
 #include "physics/tables.glsl"
 #include "physics/handover.glsl"
+#include "physics/shadow.glsl"
 #include "forest/cull.glsl"
 #include "forest/members.glsl"
 
@@ -77,10 +78,11 @@ Tree make_tree(Seed s, vec3 centre, Species kind) {
     t.view_weights = weights;
     t.light_layers = lookup((back * v.sun_direction) / kind.scale_to_metres, weights);
     t.light_weights = weights;
-    // One integer mip a tree: the level whose texels are nearest a pixel, on the wider side of the box.
+    // One integer mip a tree: texels of 0.35 to 0.7 pixels on the wider side of the box, because bilinear filters are two
+    // texels wide. A level coarser blurs neighbouring crowns into each other's gaps, and more ground shows than should.
     float extent = 2.0 * max(kind.scale_to_metres.x, kind.scale_to_metres.z) * s.scale;
     float texels_per_pixel = RESOLUTION * distance / (extent * v.pixels_at_1m);
-    t.mip = clamp(floor(log2(max(texels_per_pixel, 1e-6)) + 0.5), 0.0, log2(RESOLUTION));
+    t.mip = clamp(floor(log2(max(texels_per_pixel, 1e-6)) - 0.5), 0.0, log2(RESOLUTION));
     // Trees end smoothly at their range (BN12, section 7), and where the camera enters the crown.
     float reach = distance / kind.range;
     vec3 eye = (back * -centre) / (kind.scale_to_metres * s.scale);
@@ -95,9 +97,11 @@ Tree make_tree(Seed s, vec3 centre, Species kind) {
     // rho / 2 of a leaf that the upper hemisphere lights, times the visibility of the sky above a slope (BN12, eq. 9).
     t.sky = tint * (kind.reflectance + kind.transmittance) * (0.25 * (1.0 + ground.z)) * v.sky_radiance;
     t.hole = density / (v.hole_radius * v.hole_radius);
-    average_light(t, kind, to_camera, ground, density, converged(reach));
+    average_light(t, kind, to_camera, ground, density, converged(reach, v.convergence));
     uint cascade = 0u;
     for (uint c = 0u; c + 1u < v.cascade_count; c++) cascade += distance > v.cascade_far[c] ? 1u : 0u;
+    t.canopy = plane_gradient(ground, v.cascade_planes[3u * cascade].xyz, v.cascade_planes[3u * cascade + 1u].xyz,
+                              v.sun_direction);
     t.cascade = v.cascade_count == 0u || distance > v.cascade_far[v.cascade_count - 1u] ? MAX_CASCADES : cascade;
     return t;
 }

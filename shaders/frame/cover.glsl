@@ -23,7 +23,7 @@ Cover cover() {
     Cover c;
     for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] = vec4(0.0);
     vec2 dx = dFdx(cover_at.xy), dy = dFdy(cover_at.xy);
-    float footprint = 0.5 * log2(max(max(dot(dx, dx), dot(dy, dy)), 1e-30)) + log2(COVER_SIDE);
+    float footprint = 0.5 * log2(max(max(dot(dx, dx), dot(dy, dy)), 1e-30)) + log2(COVER_SIDE) + view.v.footprint;
     float lod = max(footprint, cover_at.z);
     for (uint g = 0u; g < COVER_LAYERS; g++) {
         c.channels[g] = textureLod(cover_tiles, vec3(cover_at.xy, float(cover_layer + g)), min(lod, 3.0));

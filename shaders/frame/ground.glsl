@@ -9,7 +9,7 @@ layout(location = 2) flat in uint layer;
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 3) uniform sampler2DArray slope_tiles;
 layout(binding = 4) uniform sampler2DArray albedo;
-layout(binding = 5) uniform usampler2DArray shadow_map;
+layout(binding = 5) uniform sampler2DArray shadow_map;
 layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
 
 #include "frame/cover.glsl"
@@ -26,11 +26,12 @@ float shadow_maps(vec3 n, float cosine, float distance) {
     uint c = 0u;
     for (uint k = 0u; k + 1u < view.v.cascade_count; k++) c += distance > view.v.cascade_far[k] ? 1u : 0u;
     if (view.v.cascade_count == 0u || distance > view.v.cascade_far[view.v.cascade_count - 1u]) return 1.0;
-    // A texel of the map spans ground of differing depth: move the lookup out of the surface by its half diagonal, more
-    // where the sun grazes.
+    // Ground that curves within a texel would shade itself: half a texel towards the sun, more where the sun grazes.
     float texel = view.v.cascade_texel[c];
-    vec3 from = position + n * (texel * 1.5 * sqrt(1.0 - cosine * cosine)) + view.v.sun_direction * (0.5 * texel);
-    return sun_visibility(shadow_map, (view.v.cascade_from_world[c] * vec4(from, 1.0)).xyz, c);
+    vec3 from = position + n * (texel * sqrt(1.0 - cosine * cosine)) + view.v.sun_direction * (0.5 * texel);
+    vec2 gradient = plane_gradient(n, view.v.cascade_planes[3u * c].xyz, view.v.cascade_planes[3u * c + 1u].xyz,
+                                   view.v.sun_direction);
+    return sun_visibility(shadow_map, (view.v.cascade_from_world[c] * vec4(from, 1.0)).xyz, gradient, c);
 }
 
 // Ground and, where trees are not drawn one by one, the trees on it (BN12, eq. 11-13 and 24-27).

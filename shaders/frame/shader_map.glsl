@@ -46,7 +46,7 @@ ForestPixel shader_map(vec3 v, vec3 n, float distance, Cover c) {
         float l = share * x * a.sec_v * t.x, reach = distance / s.range, part = l * handed_over(reach);
         seen += l;
         f.over += part;
-        f.converged += l * converged(reach);
+        f.converged += l * converged(reach, view.v.convergence);
         f.seen_coverage += share * t.w;
         log_sky += share * log(max(g.x, 1e-6));
         log_gap += share * log(max(1.0 - g.y, 1e-6));

@@ -5,8 +5,6 @@
 #include "interface.glsl"
 #include "frame/terrain.glsl"
 
-layout(location = 0) out float depth;
-
 void main() {
     vec2 within;
     vec3 place;
@@ -14,7 +12,6 @@ void main() {
     vec4 at = view.v.cascade_from_world[cascade] * vec4(position, 1.0);
     // Ground before the cascade's near side casts from there.
     at.z = min(at.z, 1.0);
-    depth = at.z;
     gl_Position = at;
     gl_Layer = int(cascade);
 }

@@ -33,6 +33,7 @@ layout(location = 22) flat out float dither;
 layout(location = 23) flat out vec4 bark;       // relative colour; w: height under which there is only bark
 layout(location = 24) flat out vec4 mean_sun;   // average light, times nu; w: 1 - nu
 layout(location = 25) flat out vec4 mean_sky;   // w: average lit fraction, times nu
+layout(location = 26) flat out vec2 canopy;     // change of depth of the canopy along the axes of the cascade
 
 void main() {
     View v = view.v;
@@ -85,5 +86,6 @@ void main() {
     bark = vec4(kind.bark, kind.crown_base);
     mean_sun = vec4(t.mean_sun, t.own);
     mean_sky = vec4(t.mean_sky, t.mean_lit);
+    canopy = t.canopy;
     dither = unit(hash(t.identity ^ HASH_DITHER));
 }

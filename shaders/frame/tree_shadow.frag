@@ -5,7 +5,6 @@
 #extension GL_GOOGLE_include_directive : require
 #include "physics/hash.glsl"
 #include "physics/zfield.glsl"
-#include "physics/shadow.glsl"
 
 layout(location = 0) in vec3 light_p[3];
 layout(location = 3) in float depth;
@@ -14,7 +13,6 @@ layout(location = 7) flat in vec4 optics;
 layout(location = 8) flat in float depth_per_metre;
 layout(location = 9) flat in uint dither;
 layout(binding = 5) uniform sampler2DArray views;
-layout(location = 0) out uint caster;
 
 void main() {
     vec3 p[3], d[3];
@@ -28,7 +26,5 @@ void main() {
     // Texels side by side get dithers far apart: steps of the plastic number's powers (Roberts 2018, "R2 sequence").
     uvec2 at = uvec2(gl_FragCoord.xy);
     if (back.opacity * optics.w <= unit(dither + at.x * 3242174889u + at.y * 2447445413u)) discard;
-    float z = clamp(depth + back.s * depth_per_metre, 0.0, 1.0);
-    gl_FragDepth = z;
-    caster = pack_caster(z, 1.0);
+    gl_FragDepth = clamp(depth + back.s * depth_per_metre, 0.0, 1.0);
 }

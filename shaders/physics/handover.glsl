@@ -1,8 +1,8 @@
 // From trees drawn one by one to the shader-map (BN12, section 7). Twin: src/physics/handover.rs, where the forms are
 // derived. `reach` is the distance over that at which a species is no longer drawn tree by tree (s / s_max).
 
-// How far light and ground have converged to their averages: nu of BN12, eq. 22-25.
-float converged(float reach) { return smoothstep(0.0, 0.8, reach); }
+// How far light and ground have converged to their averages: nu of BN12, eq. 22-25; `end` is 0.8 there.
+float converged(float reach, float end) { return smoothstep(0.0, end, reach); }
 
 // Share of the trees that the shader-map shows: mean of 1 - tree_fade over u.
 float handed_over(float reach) {

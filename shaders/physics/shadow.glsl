@@ -1,24 +1,24 @@
-// Shadow map texels and their soft lookup. Twin: src/physics/shadow.rs.
+// Shadow maps: depth towards the sun, 1 nearest. Twin: src/physics/shadow.rs.
 
-// Depth towards the sun (1 nearest) in 24 bits and opacity in 8: one texel, one tree.
-uint pack_caster(float depth, float opacity) {
-    return uint(clamp(depth, 0.0, 1.0) * 16777215.0) << 8u | uint(clamp(opacity, 0.0, 1.0) * 255.0 + 0.5);
+// Change of depth in a cascade (z in [0, 1] over the width of xy in [-1, 1]) along its axes x and y, on a plane with the
+// normal n; at most that of a plane 76 degrees from facing the sun.
+vec2 plane_gradient(vec3 n, vec3 x, vec3 y, vec3 sun) {
+    return clamp(vec2(dot(n, x), dot(n, y)) * (-0.5 / max(dot(n, sun), 1e-3)), -2.0, 2.0);
 }
 
-// How much of the sun each of four casters leaves to a point at `depth`.
-vec4 caster_visibility(uvec4 casters, float depth) {
-    vec4 at = vec4(casters >> 8u) * (1.0 / 16777215.0);
-    vec4 opacity = vec4(casters & 255u) * (1.0 / 255.0);
-    return 1.0 - mix(vec4(0.0), opacity, greaterThan(at, vec4(depth)));
-}
+// Which of four casters leave the sun to points at the depths.
+vec4 caster_visibility(vec4 casters, vec4 depths) { return vec4(lessThanEqual(casters, depths)); }
 
-// Bilinear blend of the four casters around a position in [-1, 1]^2; lit outside.
-float sun_visibility(usampler2DArray map, vec3 at, uint cascade) {
+// Bilinear blend over the four texels around a position in [-1, 1]^2; lit outside. What is lit is a part of a plane, a canopy
+// or the ground, that casters are drawn at the texels' centres of: so the depth to compare with is the plane's there.
+float sun_visibility(sampler2DArray map, vec3 at, vec2 gradient, uint cascade) {
     float side = float(textureSize(map, 0).x);
     vec2 t = (at.xy * 0.5 + 0.5) * side - 0.5;
     vec2 cell = floor(t), f = t - cell;
+    vec2 step = gradient * (2.0 / side);
+    vec4 depths = at.z + step.x * (vec4(0.0, 1.0, 1.0, 0.0) - f.x) + step.y * (vec4(1.0, 1.0, 0.0, 0.0) - f.y);
     // Gathered at the corner that the four texels share, so that they are the ones that f weighs.
-    vec4 lit = caster_visibility(textureGather(map, vec3((cell + 1.0) / side, float(cascade))), at.z);
+    vec4 lit = caster_visibility(textureGather(map, vec3((cell + 1.0) / side, float(cascade))), depths);
     vec2 along = mix(lit.wx, lit.zy, f.x);
     return all(lessThan(abs(at.xy), vec2(1.0))) ? mix(along.x, along.y, f.y) : 1.0;
 }

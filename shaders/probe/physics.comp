@@ -49,8 +49,8 @@ void main() {
         case 7u: r.a.x = covered_samples(a.x, a.y, i.a.z); break;
         case 8u: r.a.x = mask_column(i.a.xyz, i.b.x, i.b.y); break;
         case 9u: {
-            uint caster = pack_caster(a.x, a.y);
-            r.a.xy = uvec2(caster, floatBitsToUint(caster_visibility(uvec4(caster), a.z).x));
+            vec2 gradient = plane_gradient(a.xyz, b.xyz, c.xyz, vec3(a.w, b.w, c.w));
+            r.a.xy = floatBitsToUint(gradient);
             break;
         }
         case 10u: r.a.xyz = floatBitsToUint(tone_curve(a.xyz)); break;

@@ -21,7 +21,8 @@ pub struct Eye {
     pub tangents: [f64; 2],
     /// Pixels.
     pub size: [u32; 2],
-    /// Pixels that one metre covers at one metre.
+    /// Pixels that one metre covers at one metre, for everything that chooses a level of detail. Usually those of the image; a
+    /// measurement may take few samples of what a sharper image would show.
     pub pixels_at_1m: f64,
 }
 
@@ -97,6 +98,11 @@ impl Eye {
             side(self.up, -1.0, ty),
             [f[0], f[1], f[2], -NEAR_PLANE],
         ]
+    }
+
+    /// Distances between the image's own pixels that one metre covers at one metre.
+    pub fn raster_at_1m(&self) -> f64 {
+        0.5 * f64::from(self.size[1]) / self.tangents[1]
     }
 
     /// Unit vector through a corner of the image.

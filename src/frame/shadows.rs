@@ -27,9 +27,8 @@ pub struct TerrainPush {
 
 /// Shadow maps and the programs that draw them.
 pub struct Shadows {
-    /// Depth and opacity of the caster nearest the sun, one layer a cascade.
+    /// Depth of the caster nearest the sun, one layer a cascade.
     pub map: Image,
-    depth: Option<Image>,
     programs: Option<(Program, Program)>,
 }
 
@@ -42,14 +41,20 @@ impl Shadows {
         let on = plan.cascades > 0;
         let side = if on { scene.settings.cascade_size } else { 1 };
         let layers = plan.cascades.max(1);
-        let image = |name, format, usage| {
-            gpu.image(&ImageDesc { name, format, size: [side; 2], layers, levels: 1, samples: 1, usage })
-        };
+        let map = gpu.image(&ImageDesc {
+            name: "shadow cascades",
+            format: vk::Format::D32_SFLOAT,
+            size: [side; 2],
+            layers,
+            levels: 1,
+            samples: 1,
+            usage: vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+        })?;
         let program = |vert, frag, constants| {
             gpu.graphics(&GraphicsDesc {
                 vert,
                 frag,
-                colors: &[vk::Format::R32_UINT],
+                colors: &[],
                 samples: 1,
                 depth: DepthTest::Reverse,
                 blend: Blend::Replace,
@@ -58,17 +63,11 @@ impl Shadows {
         };
         let s = &scene.settings;
         let views = [(0, s.view_rings), (1, (s.view_resolution as f32).to_bits())];
-        let map = image("shadow cascades", vk::Format::R32_UINT, vk::ImageUsageFlags::COLOR_ATTACHMENT)?;
         if !on {
-            return Ok(Shadows { map, depth: None, programs: None });
+            return Ok(Shadows { map, programs: None });
         }
         Ok(Shadows {
             map,
-            depth: Some(image(
-                "shadow depth",
-                vk::Format::D32_SFLOAT,
-                vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
-            )?),
             programs: Some((
                 program(&shaders::FRAME_TERRAIN_SHADOW_VERT, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[])?,
                 program(&shaders::FRAME_TREE_SHADOW_VERT, &shaders::FRAME_TREE_SHADOW_FRAG, &views)?,
@@ -98,10 +97,10 @@ impl Shadows {
         (terrain, draws): (&TerrainData, &TerrainDraws),
         trees: Option<(&CullData, &SeedData, &SpeciesData)>,
     ) {
-        let (Some(depth), Some((ground, tree))) = (&self.depth, &self.programs) else { return };
+        let Some((ground, tree)) = &self.programs else { return };
         let targets = Targets {
-            colors: &[Attachment { image: &self.map, resolve: None, clear: Some([0.0; 4]) }],
-            depth: Some(Attachment { image: depth, resolve: None, clear: Some([0.0; 4]) }),
+            colors: &[],
+            depth: Some(Attachment { image: &self.map, resolve: None, clear: Some([0.0; 4]) }),
             layers: self.map.layers(),
         };
         recorder.render("shadows", &targets, |pass| {

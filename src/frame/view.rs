@@ -115,10 +115,12 @@ pub fn view(
     view.sky_radiance = scaled(light.sky);
     view.camera_height = eye.position[2] as f32;
     view.pixels_at_1m = eye.pixels_at_1m as f32;
+    view.footprint = (eye.raster_at_1m() / eye.pixels_at_1m).log2() as f32;
     view.hotspot_amplitude = s.hotspot_amplitude;
     view.hotspot_width = s.hotspot_width;
     view.ground_contrast = s.ground_contrast;
     view.hole_radius = s.hole_radius;
+    view.convergence = s.convergence;
     view.range = plan.range.max(1.0) as f32;
     view
 }

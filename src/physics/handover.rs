@@ -14,18 +14,18 @@
 //! exp(−L) (1 − Γ)/(1 − C), whose mean over any distribution of Γ is exp(−L); replacing Λ by Γ/A, as BN12 do, makes
 //! the mean of a convex function of it, and too much ground: 0.6 instead of 0.23 at 70° and half coverage.
 
-/// `reach` from which light and ground are the averages alone.
-pub const CONVERGED: f64 = 0.8;
-
-/// ν of BN12, eq. 22–25: how far light and ground have converged to their averages.
-pub fn converged(reach: f64) -> f64 {
-    let t = (reach / CONVERGED).clamp(0.0, 1.0);
+/// ν of BN12, eq. 22–25: how far light and ground have converged to their averages, which they are from `end` on.
+///
+/// BN12 end at 0.8. Trees of a few pixels know their light only roughly: shadow maps blur it, so that what is brightest
+/// (the hotspot) darkens and what is darkest brightens. An earlier end keeps more of the average and takes fewer shadows.
+pub fn converged(reach: f64, end: f64) -> f64 {
+    let t = (reach / end).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
 /// S: share of the trees that the shader-map shows; 0 up to 0.8, 1 from 1 on.
 pub fn handed_over(reach: f64) -> f64 {
-    let t = ((reach - CONVERGED) / (1.0 - CONVERGED)).clamp(0.0, 1.0);
+    let t = ((reach - 0.8) / 0.2).clamp(0.0, 1.0);
     if t < 0.5 { 2.0 * t * t } else { 1.0 - 2.0 * (1.0 - t) * (1.0 - t) }
 }
 

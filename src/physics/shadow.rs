@@ -1,15 +1,15 @@
-//! Shadow map texels; twin of `shaders/physics/shadow.glsl`.
+//! Shadow maps; twin of `shaders/physics/shadow.glsl`.
+//!
+//! A texel holds one depth. Where several semi-transparent trees lie one behind the other towards the sun, each is drawn into
+//! the texel with the probability of its opacity: a point behind all of them is lit with the probability ∏ (1 − α), as
+//! it should be, at every resolution of the map. Depth and opacity of the nearest tree alone, as BN12 keep them, forget
+//! the others: ten times too much light on the ground of a dense forest.
 
-/// Depth towards the sun (1 nearest) in 24 bits and opacity in 8.
-pub fn pack_caster(depth: f64, opacity: f64) -> u32 {
-    let depth = (depth.clamp(0.0, 1.0) * 16_777_215.0) as u32;
-    depth << 8 | (opacity.clamp(0.0, 1.0) * 255.0 + 0.5) as u32
-}
-
-/// How much of the sun a caster leaves to a point at `depth`.
-pub fn caster_visibility(caster: u32, depth: f64) -> f64 {
-    let at = f64::from(caster >> 8) / 16_777_215.0;
-    if at > depth { 1.0 - f64::from(caster & 255) / 255.0 } else { 1.0 }
+/// Change of depth along a cascade's axes x and y, per unit of xy where the cascade is [−1, 1]² wide and its depth [0, 1], on a
+/// plane of normal n: dz = −(n·x, n·y)/(n·sun)/2, at most 2 either way.
+pub fn plane_gradient(n: [f64; 3], x: [f64; 3], y: [f64; 3], sun: [f64; 3]) -> [f64; 2] {
+    let dot = |a: [f64; 3]| n[0] * a[0] + n[1] * a[1] + n[2] * a[2];
+    [x, y].map(|a| (-0.5 * dot(a) / dot(sun).max(1e-3)).clamp(-2.0, 2.0))
 }
 
 /// Cascade ranges of parallel-split shadow maps (Zhang et al. 2006): logarithmic and uniform splits mixed by `lambda`.
@@ -28,13 +28,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn casters_keep_their_depth_and_opacity() {
-        for k in 0..=1000 {
-            let (d, o) = (f64::from(k) / 1000.0, 1.0 - f64::from(k) / 1000.0);
-            let c = pack_caster(d, o);
-            // A step of 24 and of 8 bits.
-            assert!((caster_visibility(c, -1.0) - (1.0 - o)).abs() <= 0.5 / 255.0 + 1e-12);
-            assert_eq!(caster_visibility(c, d + 1e-7), 1.0);
+    fn a_plane_is_as_deep_as_its_gradient_says() {
+        // The sun at 40 degrees above the south; level ground and a slope. Points of the plane, in the cascade's axes.
+        let (s, c) = 40f64.to_radians().sin_cos();
+        let (x, y, sun) = ([1.0, 0.0, 0.0], [0.0, s, c], [0.0, -c, s]);
+        let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
+        for n in [[0.0, 0.0, 1.0], [0.2, -0.1, 0.97]] {
+            let g = plane_gradient(n, x, y, sun);
+            for p in [[1.0, 0.0], [0.0, 1.0], [3.0, -2.0]] {
+                let point = [p[0], p[1], -(n[0] * p[0] + n[1] * p[1]) / n[2]];
+                // Half the change of z over the same distance: depth is over twice the half width.
+                let depth = 0.5 * dot(point, sun);
+                assert!((g[0] * dot(point, x) + g[1] * dot(point, y) - depth).abs() < 1e-12);
+            }
         }
     }
 
