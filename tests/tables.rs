@@ -371,7 +371,7 @@ fn lookups_are_continuous_and_finite() {
                         steps.into_iter().chain([(-e, 0.0, 0.0, 0.0), (0.0, -e, 0.0, 0.0)])
                     {
                         // At the ends of θ_v all nodes of one side are one direction; its cells shrink to a point.
-                        let end = |a: f64| a < 1e-6 || a > tables::THETA_MAX - 1e-6;
+                        let end = |a: f64| !(1e-6..tables::THETA_MAX - 1e-6).contains(&a);
                         if end(v) && dv != 0.0 && (v - l).abs() < 1e-6 {
                             continue;
                         }
