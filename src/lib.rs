@@ -35,12 +35,13 @@
 //! | BN12 §5, views of a z-field | [`bake`], [`physics::views`] | `physics/views.glsl` | `tests/views.rs`, `tests/bake.rs`, `tests/gpu/views.rs` |
 //! | BN12 §5, surface along a ray | [`physics::zfield`] | `physics/zfield.glsl` | `tests/zfield.rs`, `tests/zfield_quality.rs`, `tests/gpu/zfield.rs` |
 //! | BN12 eq. 7–12, light | [`physics::light`] | `physics/light.glsl`, `frame/tree_shade.glsl`, `frame/ground.glsl` | `tests/gpu/light.rs`, `tests/gpu/light_on_ground.rs` |
+//! | BN12 §6, tables G, T, D, E of far forests | [`bake::tables`], [`physics::tables`] | | `tests/tables.rs` |
 //! | BN12 §8, culling in order | [`forest::cull`] | `forest/cull.comp`, `forest/scan.comp`, `forest/compact.comp` | `tests/gpu/cull.rs` |
 //! | BN12 §8, sub-pixel masks | [`physics::masks`] | `physics/masks.glsl` | `tests/gpu/masks.rs` |
 //! | parallel-split shadow maps (Zhang et al. 2006) | [`frame::cascades`], [`frame::shadows`] | `frame/tree_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
 //! | trees that need no file (Weber and Penn 1995) | [`tree`] | | `tests/trees.rs` |
 //! | the scene file | [`scene`] | | `tests/scene_inputs.rs`, `tests/model_inputs.rs` |
-//! | bakes on disk | [`bake::cache`] | | `tests/cache.rs` |
+//! | bakes on disk | [`bake::cache`], [`bake::tables`] | | `tests/cache.rs`, `tests/tables.rs` |
 //! | what a scene requires | [`plan`] | | `tests/gpu/plan.rs` |
 //! | the whole frame: extremes, the same bits again | [`frame`] | `frame/*` | `tests/gpu/extremes.rs`, `tests/gpu/determinism.rs` |
 //! | the program | `src/cli/` | | `tests/cli.rs` |

@@ -78,7 +78,7 @@ knobs! {
     hole_radius: f32, "", 0.1..=10.0, [2.0, 2.0, 2.0], "radius of the hole around a tree times the square root of the density (BN12, eq. 9: 2; Poisson points: 0.5)";
     table_angles: u32, "", 4..=32, [16, 16, 16], "nodes of each angle in the tables of far trees; memory grows with the cube";
     table_densities: u32, "", 2..=16, [8, 8, 8], "nodes of the density in the tables of far trees; memory";
-    table_rays: u32, "", 32..=1048576, [512, 1024, 8192], "ground points and points on crowns that tables of far trees are measured at; error falls with the root, time grows in proportion";
+    table_rays: u32, "", 32..=1048576, [1024, 2048, 8192], "points on crowns that light in the tables of far trees is measured at, four to a ground point; error falls with the root, time grows in proportion";
     memory_mib: u32, "MiB", 16..=1048576, [2048, 2048, 4096], "most device memory a plan may take";
 }
 

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use canopy::Result;
+use canopy::bake::tables::{self, ForestSettings};
 use canopy::bake::{self, BakeSettings, CacheState, SpeciesBake, cache, load_or_bake};
-use canopy::scene::{Mesh, OpticsOverride, Species};
+use canopy::scene::{Mesh, OpticsOverride};
+use canopy::settings::Settings;
 
 use super::SCHEMA_VERSION;
 use super::options::{PrintOptions, QualityOptions, knobs_help};
@@ -18,6 +20,7 @@ Examples:
   canopy bake my.toml                       every species of a scene
   canopy bake oak.glb --verify 64           how well the z-field stands for the mesh
   canopy bake oak.glb --set view_rings=6    with fewer views
+  canopy bake oak.glb --forest 0.03         and the tables of a far forest of 0.03 trees per m²
 Bakes are kept in $CANOPY_CACHE, else $XDG_CACHE_HOME/canopy, else ~/.cache/canopy.";
 
 #[derive(clap::Args)]
@@ -31,6 +34,9 @@ pub struct Args {
     /// Compare the bake with its mesh from N directions between the stored views
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     verify: Option<u32>,
+    /// Measure the tables of the species' far forest, for patterns of D trees per m²
+    #[arg(long, value_name = "D")]
+    forest: Option<f64>,
     #[command(flatten)]
     quality: QualityOptions,
     #[command(flatten)]
@@ -60,6 +66,21 @@ struct Optics {
     leaf_transmittance: [f32; 3],
 }
 
+/// Tables of a far forest.
+#[derive(serde::Serialize)]
+struct Forest {
+    trees_per_m2: f64,
+    max_thickness: f32,
+    cache: &'static str,
+    path: Option<String>,
+    seconds: f64,
+    /// Largest standard errors.
+    ground_error: f32,
+    tree_light_error: f32,
+    /// At full density: visible ground, and light on what is seen of trees from the light's own direction, by degrees.
+    samples: Vec<[f64; 3]>,
+}
+
 #[derive(serde::Serialize)]
 struct Baked {
     name: String,
@@ -72,6 +93,7 @@ struct Baked {
     seconds: f64,
     optics: Optics,
     verify: Vec<Quality>,
+    forest: Option<Forest>,
 }
 
 #[derive(serde::Serialize)]
@@ -95,14 +117,14 @@ pub fn run(args: &Args) -> Result<()> {
     if args.model.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         let mut scene = canopy::scene::load_at(Some(&args.model), args.quality.preset.as_deref())?;
         args.quality.set(&mut scene.settings)?;
-        for Species { name, mesh, optics, .. } in &scene.species {
-            species.push(one(args, name.clone(), mesh, optics, &scene.settings)?);
+        for s in &scene.species {
+            species.push(one(args, s.name.clone(), (&s.mesh, &s.optics, s.scale), &scene.settings)?);
         }
     } else {
         let settings = args.quality.settings()?;
         let mesh = canopy::scene::model::load_named(&args.model, args.height)?;
         let name = args.model.display().to_string();
-        species.push(one(args, name, &mesh, &OpticsOverride::default(), &settings)?);
+        species.push(one(args, name, (&mesh, &OpticsOverride::default(), [1.0; 2]), &settings)?);
     }
     let report = Report { schema_version: SCHEMA_VERSION, command: "bake", species };
     if args.print.json {
@@ -118,9 +140,8 @@ pub fn run(args: &Args) -> Result<()> {
 fn one(
     args: &Args,
     name: String,
-    mesh: &Mesh,
-    optics: &OpticsOverride,
-    settings: &canopy::settings::Settings,
+    (mesh, optics, scale): (&Mesh, &OpticsOverride, [f32; 2]),
+    settings: &Settings,
 ) -> Result<Baked> {
     let wanted = BakeSettings::from(settings);
     let dir = cache::default_dir();
@@ -134,6 +155,7 @@ fn one(
         }
         None => Vec::new(),
     };
+    let forest = args.forest.map(|d| forest(args, &bake, scale, d, settings)).transpose()?;
     Ok(Baked {
         name,
         triangles: mesh.triangles.len(),
@@ -153,6 +175,39 @@ fn one(
             leaf_transmittance: bake.transmittance,
         },
         verify,
+        forest,
+    })
+}
+
+/// Measures the tables of a species, or reads them.
+fn forest(
+    args: &Args,
+    bake: &SpeciesBake,
+    scale: [f32; 2],
+    density: f64,
+    settings: &Settings,
+) -> Result<Forest> {
+    let wanted = ForestSettings::new(settings, density, scale, false);
+    let dir = cache::default_dir();
+    let start = Instant::now();
+    let (t, from) = tables::load_or_measure(bake, &wanted, dir.as_deref(), args.print.quiet)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let path = dir.map(|d| tables::path(&d, &tables::key(bake, &wanted))).filter(|p| p.is_file());
+    let x = f64::from(t.max_thickness);
+    let sample = |degrees: f64| {
+        let a = degrees.to_radians();
+        let [_, leaf, bark] = canopy::physics::tables::pair(&t, a, a, 0.0, x);
+        [degrees, canopy::physics::tables::visible_ground(&t, a, x), leaf + bark]
+    };
+    Ok(Forest {
+        trees_per_m2: density,
+        max_thickness: t.max_thickness,
+        cache: state(from),
+        path: path.map(|p| p.display().to_string()),
+        seconds,
+        ground_error: t.pair_stderr.iter().map(|e| e[0]).fold(0.0, f32::max),
+        tree_light_error: t.pair_stderr.iter().map(|e| e[1]).fold(0.0, f32::max),
+        samples: [0.0, 30.0, 60.0, 80.0].map(sample).to_vec(),
     })
 }
 
@@ -191,6 +246,23 @@ fn text(b: &Baked) -> String {
         table.row([format!("  {what}"), value]);
     }
     let mut text = table.text();
+    if let Some(f) = &b.forest {
+        let title = format!("  forest of {} trees per m²", f.trees_per_m2);
+        let mut table = Table::new(2, &[title.as_str(), ""]);
+        let cache = format!("{} {}", f.cache, f.path.as_deref().unwrap_or("(not kept)"));
+        table.row(["  λA".into(), format!("{:.3}", f.max_thickness)]);
+        table.row(["  time".into(), format!("{:.2} s", f.seconds)]);
+        table.row(["  cache".into(), cache]);
+        table.row([
+            "  largest error of G, T".into(),
+            format!("{:.4}, {:.4}", f.ground_error, f.tree_light_error),
+        ]);
+        for [degrees, visible, lit] in &f.samples {
+            table
+                .row([format!("  ground seen, light seen at {degrees}°"), format!("{visible:.4}, {lit:.4}")]);
+        }
+        text += &table.text();
+    }
     if !b.verify.is_empty() {
         let headings = ["iterations", "IoU mean", "IoU min", "coverage", "depth error: median", "mean"];
         let mut table = Table::new(0, &headings);

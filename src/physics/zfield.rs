@@ -188,3 +188,9 @@ pub fn light_ray(field: &ZField, level: usize, p: DVec3, l: DVec3, iterations: u
     }
     Entry { s: found.s, point: p + found.s * l, alpha: found.alpha, occlusion: found.occlusion }
 }
+
+/// The back of the tree on a ray towards the light, for the shadow map: one look, at the start of the ray.
+pub fn cast(field: &ZField, level: usize, lookup: &Lookup, ray: &Ray) -> Entry {
+    let found = look(field, level, lookup, ray, 0.0, sample, (!lookup.below, false));
+    Entry { s: found.s, point: ray.origin + found.s * ray.to, alpha: found.alpha, occlusion: found.occlusion }
+}

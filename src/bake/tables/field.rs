@@ -16,7 +16,7 @@ struct Level {
     /// Texels a side, without the border.
     size: f32,
     /// Texels a row, with the border.
-    stride: usize,
+    stride: u32,
     /// RGBA8 of all layers.
     texels: Vec<u32>,
 }
@@ -35,42 +35,63 @@ impl Level {
                 *t = u32::from_le_bytes(*b);
             }
         }
-        Level { size: size as f32, stride, texels }
+        Level { size: size as f32, stride: stride as u32, texels }
     }
 
+    #[inline(always)]
     fn layer(&self, layer: u32) -> &[u32] {
-        let size = self.stride * self.stride;
+        let size = (self.stride * self.stride) as usize;
         &self.texels[layer as usize * size..][..size]
     }
 
-    /// Bilinear sample of two channels and the opacity, in 1/255.
-    #[inline]
-    fn sample(&self, layer: u32, x: f32, y: f32, first: u32, second: u32) -> [f32; 3] {
+    /// The four texels around a position, and their weights in 1/256, which sum to 256: a fraction of 8 bits, as graphics
+    /// hardware filters. `None` where all four are empty.
+    #[inline(always)]
+    fn around(&self, layer: u32, x: f32, y: f32) -> Option<([u32; 4], [u32; 4])> {
         // Texel centres lie at whole numbers, the border's at 0 and size + 1.
-        let top = self.size + 0.999;
-        let x = (x * self.size + 0.5).clamp(0.0, top);
-        let y = (y * self.size + 0.5).clamp(0.0, top);
-        let (xi, yi) = (x as u32, y as u32);
-        let (fx, fy) = (x - xi as f32, y - yi as f32);
-        let at = yi as usize * self.stride + xi as usize;
-        let texels = &self.layer(layer)[at..at + self.stride + 2];
-        let t = [texels[0], texels[1], texels[self.stride], texels[self.stride + 1]];
-        let weights = [(1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy];
-        let mut sum = [0.0; 3];
-        for (t, w) in t.iter().zip(weights) {
-            sum[0] += w * (t >> first & 255) as f32;
-            sum[1] += w * (t >> second & 255) as f32;
-            sum[2] += w * (t >> 24) as f32;
+        let place = |v: f32| ((v * self.size + 0.5).clamp(0.0, self.size + 0.999) * 256.0) as u32;
+        let (x, y) = (place(x), place(y));
+        let at = ((y >> 8) * self.stride + (x >> 8)) as usize;
+        let texels = &self.layer(layer)[at..at + self.stride as usize + 2];
+        let t = [texels[0], texels[1], texels[self.stride as usize], texels[self.stride as usize + 1]];
+        if t[0] | t[1] | t[2] | t[3] < 1 << 24 {
+            return None;
         }
-        sum
+        let (fx, fy) = (x & 255, y & 255);
+        let both = (fx * fy + 128) >> 8;
+        Some((t, [256 + both - fx - fy, fx - both, fy - both, both]))
+    }
+
+    /// Bilinear sample of nearest depth, occlusion and opacity.
+    #[inline(always)]
+    fn near(&self, layer: u32, x: f32, y: f32) -> [f32; 3] {
+        let Some((t, w)) = self.around(layer, x, y) else { return [0.0; 3] };
+        // Two channels at a time: a weighted sum of bytes fits 16 bits.
+        let (mut rb, mut ga) = (0, 0);
+        for (t, w) in t.iter().zip(w) {
+            rb += (t & 0xff00ff) * w;
+            ga += (t >> 8 & 0xff00ff) * w;
+        }
+        [rb & 0xffff, rb >> 16, ga >> 16].map(|x| x as f32 * (1.0 / 65280.0))
+    }
+
+    /// Bilinear sample of farthest depth and opacity.
+    #[inline(always)]
+    fn far(&self, layer: u32, x: f32, y: f32) -> Option<[f32; 2]> {
+        let (t, w) = self.around(layer, x, y)?;
+        let mut ga = 0;
+        for (t, w) in t.iter().zip(w) {
+            ga += (t >> 8 & 0xff00ff) * w;
+        }
+        Some([ga & 0xffff, ga >> 16].map(|x| x as f32 * (1.0 / 65280.0)))
     }
 
     /// The texel at a position, unfiltered; outside, that of the field's border.
-    #[inline]
+    #[inline(always)]
     fn nearest(&self, layer: u32, x: f32, y: f32) -> [f32; 3] {
-        let at = |v: f32| (v * self.size).clamp(0.0, self.size - 1.0) as usize + 1;
-        let t = self.layer(layer)[at(y) * self.stride + at(x)];
-        [(t & 255) as f32, (t >> 16 & 255) as f32, (t >> 24) as f32]
+        let at = |v: f32| (v * self.size).clamp(0.0, self.size - 1.0) as u32 + 1;
+        let t = self.layer(layer)[(at(y) * self.stride + at(x)) as usize];
+        [t & 255, t >> 16 & 255, t >> 24].map(|x| x as f32 * (1.0 / 255.0))
     }
 }
 
@@ -149,9 +170,8 @@ impl FieldCrown {
         for view in &aim.views {
             let x = 0.5 + a * view.u[0] + b * view.u[1] + s * view.u[2];
             let y = 0.5 + a * view.v[0] + b * view.v[1] + s * view.v[2];
-            let t =
-                if filter { level.sample(view.layer, x, y, 0, 16) } else { level.nearest(view.layer, x, y) };
-            let [r, o, t_alpha] = t.map(|t| t * (1.0 / 255.0));
+            let [r, o, t_alpha] =
+                if filter { level.near(view.layer, x, y) } else { level.nearest(view.layer, x, y) };
             let z = SQRT_2 * (2.0 * r - t_alpha);
             let across = a * view.depth[0] + b * view.depth[1];
             let mut k = view.weight;
@@ -221,7 +241,7 @@ impl Crown for FieldCrown {
         for view in &aim.views {
             let x = 0.5 + a * view.u[0] + b * view.u[1];
             let y = 0.5 + a * view.v[0] + b * view.v[1];
-            let [_, g, t_alpha] = self.fine.sample(view.layer, x, y, 0, 8).map(|t| t * (1.0 / 255.0));
+            let Some([g, t_alpha]) = self.fine.far(view.layer, x, y) else { continue };
             let across = a * view.depth[0] + b * view.depth[1];
             alpha += view.weight * t_alpha;
             sum_s += view.weight * (SQRT_2 * (2.0 * g - t_alpha) - t_alpha * across) * view.inverse_depth;

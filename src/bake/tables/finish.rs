@@ -8,23 +8,19 @@ use crate::physics::tables::{density_node, light_node, secant, zenith_node};
 /// A transmittance counts as measured when it is this many times its standard error.
 const SIGNIFICANT: f64 = 4.0;
 
-/// −ln of a transmittance at every density, from estimates of which the first is the limit of −ln/q.
+/// −ln of a transmittance at every density, per density, from estimates of which the first is the limit already.
 ///
 /// Optical thickness never falls with the density, nor below `least`. Where the transmittance drowns in its error, it goes on
-/// in proportion to the density from the last node that does not: the logarithm of noise would be worse.
-fn thickness(estimates: &[Estimate], nodes: &[f64], least: &[f64]) -> Vec<f64> {
-    let max = nodes[nodes.len() - 1];
-    // Per density, so that the first node has a value.
-    let mut slope = (estimates[0].0 / max).max(least[0]).max(1e-6);
-    let mut all = vec![slope];
+/// from the last node that does not in proportion to `growth`, a thickness per density known better: the logarithm of noise
+/// would be worse.
+fn thickness(estimates: &[Estimate], nodes: &[f64], least: &[f64], growth: &[f64]) -> Vec<f64> {
+    let mut all = vec![estimates[0].0.max(least[0])];
     let mut noise = false;
     for (j, &x) in nodes.iter().enumerate().skip(1) {
         let (mean, error) = estimates[j];
         noise |= mean <= SIGNIFICANT * error || mean <= 0.0;
-        let measured = if noise { slope * x } else { -mean.ln() };
-        let before = all[j - 1] * nodes[j - 1];
-        slope = measured.max(before).max(least[j] * x) / x;
-        all.push(slope);
+        let measured = if noise { all[j - 1] * growth[j] / growth[j - 1] } else { -mean.ln() / x };
+        all.push(measured.max(all[j - 1] * nodes[j - 1] / x).max(least[j]));
     }
     all
 }
@@ -35,7 +31,10 @@ pub fn tables(shape: &Shape, forest: &ForestSettings, measured: &Measured) -> Fo
     let area = mean_area(shape, forest.scale_range);
     let max_thickness = forest.pattern_density * area;
     let nodes: Vec<f64> = (0..m).map(|j| density_node(m, j, max_thickness)).collect();
-    let none = vec![0.0; m];
+    // Nothing is thinner than this, so that all that is divided by has a value.
+    let (least, even) = (vec![1e-6; m], vec![1.0; m]);
+    let full = forest.measured_density(shape) * area;
+    let limit = |x: usize, e: Estimate| if x == 0 { (e.0 / full, e.1) } else { e };
     let mut t = ForestTables {
         angles: forest.angles,
         densities: forest.densities,
@@ -52,8 +51,8 @@ pub fn tables(shape: &Shape, forest: &ForestSettings, measured: &Measured) -> Fo
     for v in 0..n {
         let theta_v = zenith_node(n, v);
         let views = &measured.view[v * m..][..m];
-        let path: Vec<Estimate> = views.iter().map(|e| e.ground).collect();
-        let path = thickness(&path, &nodes, &none);
+        let path: Vec<Estimate> = views.iter().enumerate().map(|(x, e)| limit(x, e.ground)).collect();
+        let path = thickness(&path, &nodes, &least, &even);
         for (x, e) in views.iter().enumerate() {
             let share = |e: Estimate| e.0.clamp(0.0, 1.0) as f32;
             let value = (path[x] / secant(theta_v)) as f32;
@@ -67,13 +66,14 @@ pub fn tables(shape: &Shape, forest: &ForestSettings, measured: &Measured) -> Fo
             if theta_v == 0.0 || theta_l == 0.0 {
                 estimates.chunks_exact_mut(n).for_each(isotropic);
             }
-            let lit: Vec<Estimate> = (0..m).map(|x| (estimates[x * n].lit, 0.0)).collect();
-            let lit = thickness(&lit, &nodes, &none);
+            let lit: Vec<Estimate> = (0..m).map(|x| limit(x, estimates[x * n].lit)).collect();
+            let lit = thickness(&lit, &nodes, &least, &even);
             // No more is visible and lit than is visible, or than is lit.
             let least: Vec<f64> = path.iter().zip(&lit).map(|(p, l)| p.max(*l)).collect();
+            let growth: Vec<f64> = path.iter().zip(&lit).map(|(p, l)| p + l).collect();
             for k in 0..n {
-                let joint: Vec<Estimate> = (0..m).map(|x| estimates[x * n + k].ground).collect();
-                let joint = thickness(&joint, &nodes, &least);
+                let joint: Vec<Estimate> = (0..m).map(|x| limit(x, estimates[x * n + k].ground)).collect();
+                let joint = thickness(&joint, &nodes, &least, &growth);
                 for x in 0..m {
                     let e = &estimates[x * n + k];
                     let at = ((x * n + v) * n + l) * n + k;

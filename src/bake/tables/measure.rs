@@ -11,16 +11,21 @@ use rayon::prelude::*;
 use super::ForestSettings;
 use super::crown::Crown;
 use super::patch::{Patch, Segment, TURNS, patches};
-use super::statistics::{Moments, Sequence, mean, ratio};
-use super::trace::{Azimuth, Heading, Hit, Light, Marks, Receiver, light, view};
+use super::statistics::{Moments, Sequence, mean, product, ratio};
+use super::trace::{Azimuth, Heading, Hit, Light, Marks, Receiver, light, own, view};
 use crate::physics::hash::{Stream, hash2};
-use crate::physics::tables::{azimuth_node, light_node, zenith_node};
+use crate::physics::tables::{azimuth_node, density_node, light_node, zenith_node};
 use crate::progress::Progress;
 
 /// Independent patches.
 pub const PATCHES: usize = 32;
-/// Points for quantities that need one ray only, to a point of G and T.
-const EXTRA: u32 = 8;
+/// Points on crowns to a ground point: light on them varies more than light on the ground, of which the means over view and
+/// light alone are known better.
+const CROWNS_PER_GROUND: u32 = 4;
+/// Ground points for means that need one ray only, to a ground point of G.
+const SINGLES: u32 = 16;
+/// Points on crowns of which light is followed through their own crown only, to a point of T.
+const OWN: u32 = 4;
 
 /// An estimate and its standard error.
 pub type Estimate = (f64, f64);
@@ -31,7 +36,7 @@ pub struct PairEstimate {
     /// G; at density 0 the limit of −ln G / q, q being the share of active points.
     pub ground: Estimate,
     /// Share of the ground that is lit; at density 0 likewise.
-    pub lit: f64,
+    pub lit: Estimate,
     /// T_leaf.
     pub leaf: Estimate,
     /// T_bark.
@@ -72,8 +77,9 @@ struct Scene<'a, C, const M: usize> {
     density: [f32; M],
     vertical_scale: f64,
     largest: f32,
-    /// Rays of each kind a patch.
-    rays: u32,
+    /// Points of G and of T a patch.
+    grounds: u32,
+    crowns: u32,
 }
 
 /// Sums over the rays of one patch.
@@ -81,6 +87,37 @@ type Lanes<const M: usize> = [f32; M];
 
 fn add<const M: usize>(sum: &mut Lanes<M>, x: &Lanes<M>) {
     sum.iter_mut().zip(x).for_each(|(s, x)| *s += x);
+}
+
+/// Sums of light over leaves and over bark.
+#[derive(Clone, Copy)]
+struct Split<const M: usize>([Lanes<M>; 2]);
+
+impl<const M: usize> Split<M> {
+    #[inline]
+    fn add(&mut self, weight: &Lanes<M>, light: f32, bark: f32) {
+        let [leaf, wood] = [light * (1.0 - bark), light * bark];
+        for (x, w) in weight.iter().enumerate() {
+            self.0[0][x] += w * leaf;
+            self.0[1][x] += w * wood;
+        }
+    }
+}
+
+/// Sums over the points on crowns of a patch, of what their own crowns leave of the light: over all, over those whose light
+/// is followed on, and over these of what others leave of it.
+#[derive(Clone, Copy)]
+struct TreeSums<const M: usize> {
+    isolated: Split<M>,
+    sampled: Split<M>,
+    lit: Split<M>,
+}
+
+impl<const M: usize> Default for TreeSums<M> {
+    fn default() -> Self {
+        let none = Split([[0.0; M]; 2]);
+        TreeSums { isolated: none, sampled: none, lit: none }
+    }
 }
 
 /// A ground point with what its view ray meets.
@@ -102,7 +139,21 @@ struct CrownPoint<const M: usize> {
     /// Visibility over the probability of choosing it.
     weight: Lanes<M>,
     bark: f32,
-    front: Vec<(u32, f32)>,
+    /// Crowns in front, of one in [`OWN`] points: the others are looked at for light through their own crown only.
+    front: Option<Vec<(u32, f32)>>,
+}
+
+/// A crown on a ray, of which some become points.
+struct SeenCrown<const M: usize> {
+    hit: Hit,
+    /// a_k at each density, times the ray's weight.
+    weight: Lanes<M>,
+    ray: u32,
+    /// Where the ray's crowns start.
+    first: usize,
+    /// The ray's ground point and azimuth.
+    position: [f32; 2],
+    angle: f64,
 }
 
 /// Points of a view direction, by patch, and sums over them.
@@ -112,7 +163,7 @@ struct ViewPoints<const M: usize> {
     /// Σ visible and Σ weight, by patch.
     visible: Vec<Lanes<M>>,
     weight: Vec<Lanes<M>>,
-    /// Mean of `visible` over the extra points, by patch.
+    /// Mean of `visible` over the single points, by patch.
     expected: Vec<[f64; M]>,
 }
 
@@ -140,16 +191,19 @@ pub fn measure<C: Crown, const M: usize>(
     progress: &Progress,
 ) -> Measured {
     let (n, m) = (forest.angles as usize, forest.densities as usize);
-    let q = std::array::from_fn(|j| if j < m { (j as f32 / (m - 1) as f32).powi(2) } else { 0.0 });
+    let full = forest.measured_density(crown.shape());
+    let share = |j: usize| density_node(m, j, forest.pattern_density) / full;
+    let q = std::array::from_fn(|j| if j < m { share(j) as f32 } else { 0.0 });
     let scene = Scene::<C, M> {
         crown,
         forest,
         patches: patches(crown.shape(), forest, PATCHES),
         q,
-        density: q.map(|q| q * forest.pattern_density as f32),
+        density: q.map(|q| q * full as f32),
         vertical_scale: crown.shape().vertical_scale(),
         largest: forest.scale_range[1],
-        rays: forest.rays.div_ceil(PATCHES as u32),
+        grounds: forest.rays.div_ceil(PATCHES as u32 * CROWNS_PER_GROUND),
+        crowns: forest.rays.div_ceil(PATCHES as u32),
     };
     let ground = scene.ground();
     let by_view: Vec<(Vec<ViewEstimate>, Vec<PairEstimate>)> = (0..n)
@@ -213,7 +267,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                 let (mut hits, mut discs) = (Vec::new(), Vec::new());
                 let mut sums = [[0.0; M]; 2];
                 let random = sequence::<4>(SKY, p);
-                for i in 0..EXTRA * self.rays {
+                for i in 0..SINGLES * self.grounds {
                     let [x, y, a, u] = random.at(i);
                     let position = [x, y].map(|x| (x * f64::from(patch.side)) as f32);
                     // Density of directions cos θ/π: sin² θ is uniform.
@@ -227,7 +281,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                 sums
             })
             .collect();
-        let share = 1.0 / f64::from(EXTRA * self.rays);
+        let share = 1.0 / f64::from(SINGLES * self.grounds);
         let of = |k: usize, x: usize| mean(sums.iter().map(move |s| f64::from(s[k][x]) * share));
         (0..self.densities())
             .map(|x| {
@@ -248,7 +302,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                 (visible, uncovered, self.ground_points(p, &heading), crown, sky)
             })
             .collect();
-        let share = 1.0 / f64::from(EXTRA * self.rays);
+        let share = 1.0 / f64::from(SINGLES * self.grounds);
         let estimates = (0..self.densities())
             .map(|x| ViewEstimate {
                 ground: mean(by_patch.iter().map(|p| f64::from(p.0[x]) * share)),
@@ -286,13 +340,13 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
         (points, estimates)
     }
 
-    /// Σ visible, and Σ of visible where no disc covers the ground, over the extra points of a patch.
+    /// Σ visible, and Σ of visible where no disc covers the ground, over the single points of a patch.
     fn marginals(&self, p: usize, heading: &Heading<C::Aim>) -> (Lanes<M>, Lanes<M>) {
         let patch = &self.patches[p];
         let (mut hits, mut discs) = (Vec::new(), Vec::new());
         let (mut visible, mut uncovered) = ([0.0; M], [0.0; M]);
         let random = sequence(MARGINAL, p);
-        for i in 0..EXTRA * self.rays {
+        for i in 0..SINGLES * self.grounds {
             let (position, azimuth) = self.ground_point(patch, random.at(i));
             view(self.crown, patch, heading, &Azimuth::new(azimuth), position, self.largest, &mut hits);
             let mut lanes = self.product(hits.iter().map(|h| h.alpha));
@@ -315,7 +369,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
     fn ground_points(&self, p: usize, heading: &Heading<C::Aim>) -> Vec<GroundPoint<M>> {
         let (patch, random) = (&self.patches[p], sequence(GROUND, p));
         let mut hits = Vec::new();
-        (0..self.rays)
+        (0..self.grounds)
             .map(|i| {
                 let (position, azimuth) = self.ground_point(patch, random.at(i));
                 let around = Azimuth::new(azimuth);
@@ -330,83 +384,71 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
 
     /// The points of T in a patch, and Σ of weighted sky visibility over leaves, over bark, and Σ of weights, for E.
     ///
-    /// Rays go through points of crowns' boxes, so that none is wasted where trees are few: a ray is chosen with a density
-    /// ∝ Σ 1/scale² over the boxes that it passes, and weighs the inverse. On it, the crown k of visibility
-    /// a_k = α_k ∏_{j in front} (1 − q α_j) is chosen with the mean over densities of its share of Σ a.
+    /// Rays go through points of crowns' boxes, so that few are wasted where trees are few: a ray is found with a density
+    /// ∝ Σ 1/scale² over the boxes that it passes, and weighs the inverse. Crown k on it is seen with
+    /// a_k = α_k ∏_{j in front} (1 − q α_j). Points of T are chosen among all crowns of all rays, systematically, with
+    /// probabilities ∝ the mean over densities of their share of Σ a, so that all count about the same at every density.
     fn crown_points(&self, p: usize, heading: &Heading<C::Aim>) -> (Vec<CrownPoint<M>>, [[f64; M]; 3]) {
         let patch = &self.patches[p];
         let shape = self.crown.shape();
         let extent = heading.extent();
         let random = sequence::<4>(CROWNS, p);
-        let top = shape.center + shape.half_height;
-        let mut hits: Vec<Hit> = Vec::new();
-        let mut weights: Vec<Lanes<M>> = Vec::new();
-        let (mut points, mut sky) = (Vec::new(), [[0.0; M]; 3]);
-        if patch.trees.is_empty() {
-            return (points, sky);
-        }
-        for i in 0..EXTRA * self.rays {
-            let [u, v, a, t] = random.at(i);
+        let mut sky = [[0.0; M]; 3];
+        let (mut hits, mut seen): (Vec<Hit>, Vec<SeenCrown<M>>) = (Vec::new(), Vec::new());
+        let mut total = [0.0; M];
+        for i in 0..if patch.trees.is_empty() { 0 } else { OWN * self.crowns } {
+            let [u, v, turned, t] = random.at(i);
             let tree = &patch.trees[((t * patch.trees.len() as f64) as usize).min(patch.trees.len() - 1)];
-            let angle = turn(a);
+            let angle = turn(turned);
             let azimuth = Azimuth::new(angle);
             let (a, b) = ((2.0 * u - 1.0) as f32, (2.0 * v - 1.0) as f32 * extent);
-            let [along, across] = heading.ground(self.crown, tree.scale, a, b);
-            let [ca, sa] = azimuth.along;
-            let position = [
-                (tree.position[0] + along * ca - across * sa).rem_euclid(patch.side),
-                (tree.position[1] + along * sa + across * ca).rem_euclid(patch.side),
-            ];
+            let position = heading.ground(self.crown, patch, tree, &azimuth, (a, b));
             let boxes = view(self.crown, patch, heading, &azimuth, position, self.largest, &mut hits);
             // The chosen tree's own box counts even if rounding has put the ray just beside it.
             let ray = 1.0 / boxes.max(1.0 / (self.largest * self.largest));
-            weights.clear();
-            let (mut through, mut total) = ([1.0; M], [0.0; M]);
+            let mut through = [ray; M];
+            let first = seen.len();
             for h in &hits {
-                let a: Lanes<M> = std::array::from_fn(|x| ray * h.alpha * through[x]);
+                let weight = through.map(|t| t * h.alpha);
                 through.iter_mut().zip(&self.q).for_each(|(t, q)| *t *= 1.0 - q * h.alpha);
-                add(&mut total, &a);
-                weights.push(a);
-            }
-            for (h, w) in hits.iter().zip(&weights) {
+                add(&mut total, &weight);
+                seen.push(SeenCrown { hit: *h, weight, ray: i, first, position, angle });
                 let bark = shape.bark(h.height);
                 let scale = patch.trees[h.tree as usize].scale;
                 let below_top = (1.0 - h.height).max(0.0) * shape.half_height * scale;
                 for x in 0..M {
                     let hole = self.density[x] * (below_top / self.forest.hole_radius).powi(2);
-                    let lit = f64::from(w[x] * h.occlusion / (1.0 + hole));
+                    let lit = f64::from(weight[x] * h.occlusion / (1.0 + hole));
                     sky[0][x] += lit * f64::from(1.0 - bark);
                     sky[1][x] += lit * f64::from(bark);
-                    sky[2][x] += f64::from(w[x]);
+                    sky[2][x] += f64::from(weight[x]);
                 }
             }
-            if i >= self.rays {
-                continue;
+        }
+        let lanes = self.densities();
+        let share: Vec<f64> = seen
+            .iter()
+            .map(|s| (0..lanes).map(|x| f64::from(s.weight[x] / total[x].max(f32::MIN_POSITIVE))).sum())
+            .collect();
+        let step = share.iter().sum::<f64>() / f64::from(OWN * self.crowns);
+        let mut next = Stream::new(hash2(CHOICE, p as u32)).unit() * step;
+        let mut points = Vec::new();
+        for (index, (s, share)) in seen.iter().zip(&share).enumerate() {
+            next -= share;
+            while next < 0.0 {
+                next += step;
+                let azimuth = Azimuth::new(s.angle);
+                let (position, z) = heading.point(s.position, &azimuth, s.hit.metres);
+                points.push(CrownPoint {
+                    receiver: Receiver { position, z, tree: Some(patch.trees[s.hit.tree as usize]) },
+                    azimuth: s.angle,
+                    side: side(CROWNS, p, s.ray),
+                    weight: s.weight.map(|w| (f64::from(w) / share) as f32),
+                    bark: shape.bark(s.hit.height),
+                    front: (points.len() % OWN as usize == OWN as usize / 2)
+                        .then(|| seen[s.first..index].iter().map(|f| (f.hit.tree, f.hit.alpha)).collect()),
+                });
             }
-            let lanes = self.densities();
-            let share = |w: &Lanes<M>| {
-                (0..lanes).map(|x| w[x] / total[x].max(f32::MIN_POSITIVE)).sum::<f32>() / lanes as f32
-            };
-            let mut pick = Stream::new(hash2(hash2(CHOICE, p as u32), i)).unit() as f32;
-            let chosen = weights.iter().position(|w| {
-                pick -= share(w);
-                pick < 0.0
-            });
-            let Some(k) = chosen.or(weights.len().checked_sub(1)) else { continue };
-            let (hit, probability) = (&hits[k], share(&weights[k]).max(1e-6));
-            let out = heading.sine_cosine();
-            points.push(CrownPoint {
-                receiver: Receiver {
-                    position: [0, 1].map(|d| position[d] + hit.metres * out[0] * azimuth.along[d]),
-                    z: (hit.metres * out[1]).min(top * self.largest),
-                    tree: Some(patch.trees[hit.tree as usize]),
-                },
-                azimuth: angle,
-                side: side(CROWNS, p, i),
-                weight: weights[k].map(|w| w / probability),
-                bark: shape.bark(hit.height),
-                front: hits[..k].iter().map(|h| (h.tree, h.alpha)).collect(),
-            });
         }
         (points, sky)
     }
@@ -418,7 +460,8 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
         let mut marks = Marks::new(self.patches.iter().map(|p| p.trees.len()).max().unwrap_or(0));
         // By patch: the mean share of lit ground; by azimuth and patch, sums of y, t_l, and lit leaves and bark.
         let lit: Vec<[f64; M]> = (0..PATCHES).map(|p| self.lit(p, &heading, &mut marks)).collect();
-        let mut sums = vec![[[[0f32; M]; 4]; PATCHES]; n];
+        let mut sums = vec![[[[0f32; M]; 2]; PATCHES]; n];
+        let mut trees = vec![[TreeSums::<M>::default(); PATCHES]; n];
         let mut second = vec![[[0f64; M]; 5]; n];
         for (p, patch) in self.patches.iter().enumerate() {
             let mut products = vec![[[0f32; M]; 5]; n];
@@ -427,15 +470,9 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                 let receiver = Receiver { position: g.position, z: 0.0, tree: None };
                 for k in 0..n {
                     let azimuth = Azimuth::new(g.azimuth + g.side * azimuth_node(n, k));
-                    let light: Light<M> = light(
-                        self.crown,
-                        patch,
-                        &heading,
-                        &azimuth,
-                        (&receiver, &marks),
-                        &self.q,
-                        self.largest,
-                    );
+                    let receiver = (&receiver, 0.0, &marks);
+                    let light: Light<M> =
+                        light(self.crown, patch, &heading, &azimuth, receiver, &self.q, self.largest);
                     let (v, mut l) = (&g.visible, light.alone);
                     let mut y: Lanes<M> = std::array::from_fn(|x| v[x] * light.joint[x]);
                     l[0] = light.sum;
@@ -456,31 +493,29 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                 *to += f64::from(*from);
             }
             for c in &points.crown[p] {
-                marks.set(&c.front);
-                for k in 0..n {
+                if let Some(front) = &c.front {
+                    marks.set(front);
+                }
+                for (k, trees) in trees.iter_mut().enumerate() {
+                    let trees = &mut trees[p];
                     let azimuth = Azimuth::new(c.azimuth + c.side * azimuth_node(n, k));
-                    let light: Light<M> = light(
-                        self.crown,
-                        patch,
-                        &heading,
-                        &azimuth,
-                        (&c.receiver, &marks),
-                        &self.q,
-                        self.largest,
-                    );
-                    let [_, _, leaf, bark] = &mut sums[k][p];
-                    for x in 0..M {
-                        let lit = c.weight[x] * light.own * light.joint[x];
-                        leaf[x] += lit * (1.0 - c.bark);
-                        bark[x] += lit * c.bark;
+                    let (own, entry) = own(self.crown, patch, &heading, &azimuth, &c.receiver);
+                    trees.isolated.add(&c.weight, own, c.bark);
+                    if c.front.is_none() {
+                        continue;
                     }
+                    let receiver = (&c.receiver, entry, &marks);
+                    let light: Light<M> =
+                        light(self.crown, patch, &heading, &azimuth, receiver, &self.q, self.largest);
+                    trees.sampled.add(&c.weight, own, c.bark);
+                    trees.lit.add(&std::array::from_fn(|x| c.weight[x] * light.joint[x]), own, c.bark);
                 }
             }
         }
         let mut all = vec![PairEstimate::default(); m * n];
         for (x, row) in all.chunks_exact_mut(n).enumerate() {
             for (k, estimate) in row.iter_mut().enumerate() {
-                let rays = f64::from(self.rays);
+                let rays = f64::from(self.grounds);
                 let total = |of: &dyn Fn(usize) -> f32| (0..PATCHES).map(|p| f64::from(of(p))).sum::<f64>();
                 let moments = Moments {
                     first: [
@@ -496,35 +531,38 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                     let v = f64::from(points.visible[p][x]) / rays;
                     y - bv * (v - points.expected[p][x]) - bl * (l - lit[p][x])
                 });
-                let tree = |c: usize| {
-                    ratio((0..PATCHES).map(|p| (f64::from(sums[k][p][c][x]), f64::from(points.weight[p][x]))))
+                // Light through the own crown, known from many points, times the share that others leave of it.
+                let tree = |kind: usize| {
+                    product(trees[k].iter().zip(&points.weight).map(|(t, w)| {
+                        [t.isolated.0[kind][x], w[x], t.lit.0[kind][x], t.sampled.0[kind][x]].map(f64::from)
+                    }))
                 };
                 *estimate = PairEstimate {
                     ground: mean(ground),
-                    lit: mean(lit.iter().map(|l| l[x])).0,
-                    leaf: tree(2),
-                    bark: tree(3),
+                    lit: mean(lit.iter().map(|l| l[x])),
+                    leaf: tree(0),
+                    bark: tree(1),
                 };
             }
         }
         all
     }
 
-    /// Mean light at the extra ground points of a patch; at density 0, mean Σ α'.
+    /// Mean light at the single ground points of a patch; at density 0, mean Σ α'.
     fn lit(&self, p: usize, heading: &Heading<C::Aim>, marks: &mut Marks) -> [f64; M] {
         let mut sum = [0.0; M];
         marks.set(&[]);
         let (patch, random) = (&self.patches[p], sequence(MARGINAL, p));
-        for i in 0..EXTRA * self.rays {
+        for i in 0..SINGLES * self.grounds {
             let (position, azimuth) = self.ground_point(patch, random.at(i));
             let receiver = Receiver { position, z: 0.0, tree: None };
             let around = Azimuth::new(azimuth);
             let mut light: Light<M> =
-                light(self.crown, patch, heading, &around, (&receiver, marks), &self.q, self.largest);
+                light(self.crown, patch, heading, &around, (&receiver, 0.0, marks), &self.q, self.largest);
             light.alone[0] = light.sum;
             add(&mut sum, &light.alone);
         }
-        sum.map(|s| f64::from(s) / f64::from(EXTRA * self.rays))
+        sum.map(|s| f64::from(s) / f64::from(SINGLES * self.grounds))
     }
 }
 

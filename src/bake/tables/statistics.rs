@@ -22,6 +22,23 @@ pub fn ratio(pairs: impl ExactSizeIterator<Item = (f64, f64)> + Clone) -> (f64, 
     (ratio, (squares * count / (count - 1.0).max(1.0)).sqrt() / b)
 }
 
+/// (Σ a / Σ b) (Σ c / Σ d) over patches, each of (a, b, c, d), and its standard error (linearised); 0 where a sum is.
+pub fn product(all: impl ExactSizeIterator<Item = [f64; 4]> + Clone) -> (f64, f64) {
+    let count = all.len() as f64;
+    let sums = all.clone().fold([0.0; 4], |s, x| std::array::from_fn(|k| s[k] + x[k]));
+    if sums.iter().any(|s| *s <= 0.0) {
+        return (0.0, 0.0);
+    }
+    let product = sums[0] / sums[1] * (sums[2] / sums[3]);
+    let squares: f64 = all
+        .map(|x| {
+            let [a, b, c, d]: [f64; 4] = std::array::from_fn(|k| x[k] / sums[k]);
+            (a - b + c - d).powi(2)
+        })
+        .sum();
+    (product, product * (squares * count / (count - 1.0).max(1.0)).sqrt())
+}
+
 /// Sums of products of one variable y and two controls v and l.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Moments {
@@ -113,5 +130,13 @@ mod tests {
         let (r, e) = ratio([(1.0, 2.0), (2.0, 4.0)].into_iter());
         assert!((r - 0.5).abs() < 1e-12 && e < 1e-12);
         assert_eq!(ratio([(0.0, 0.0)].into_iter()), (0.0, 0.0));
+        let patches = [[1.0, 2.0, 3.0, 4.0], [1.5, 2.0, 2.0, 4.0], [0.5, 2.0, 4.0, 4.0]];
+        let (p, e) = product(patches.into_iter());
+        // Deviations ±0.5/3 of a, ∓1/9 of c.
+        assert!(
+            (p - 0.5 * 0.75).abs() < 1e-12 && (e - p * (2.0f64 / 324.0 * 1.5).sqrt()).abs() < 1e-12,
+            "{p} {e}"
+        );
+        assert_eq!(product([[0.0, 1.0, 1.0, 1.0]].into_iter()), (0.0, 0.0));
     }
 }

@@ -55,21 +55,32 @@ impl<A> Heading<A> {
         }
     }
 
-    /// sin and cos of the zenith angle in metres.
-    pub fn sine_cosine(&self) -> [f32; 2] {
-        [self.sine, self.cosine]
-    }
-
     /// Half extents of a crown's box across the ray: |a| ≤ 1, |b| ≤ sin + cos.
     pub fn extent(&self) -> f32 {
         self.scaled[0] + self.scaled[1]
     }
 
-    /// Where a tree's ray (a, b) leaves the ground: along and across the heading from the trunk, m.
-    pub fn ground<C: Crown<Aim = A>>(&self, crown: &C, scale: f32, a: f32, b: f32) -> [f32; 2] {
+    /// Where a tree's ray (a, b) leaves the ground.
+    pub fn ground<C: Crown>(
+        &self,
+        crown: &C,
+        patch: &Patch,
+        tree: &Tree,
+        azimuth: &Azimuth,
+        (a, b): (f32, f32),
+    ) -> [f32; 2] {
         let shape = crown.shape();
         let [s, c] = self.scaled;
-        [-(b + s * shape.center / shape.half_height) * shape.radius * scale / c, a * shape.radius * scale]
+        let metres = shape.radius * tree.scale;
+        let (along, across) = (-(b + s * shape.center / shape.half_height) * metres / c, a * metres);
+        let [ca, sa] = azimuth.along;
+        let [x, y] = tree.position;
+        [x + along * ca - across * sa, y + along * sa + across * ca].map(|v| v.rem_euclid(patch.side))
+    }
+
+    /// Horizontal position and height, `metres` along a ray from the ground.
+    pub fn point(&self, ground: [f32; 2], azimuth: &Azimuth, metres: f32) -> ([f32; 2], f32) {
+        ([0, 1].map(|k| ground[k] + metres * self.sine * azimuth.along[k]), metres * self.cosine)
     }
 }
 
@@ -254,38 +265,43 @@ pub struct Light<const M: usize> {
     /// Σ α', and Σ α α' over marked crowns: the products' first orders.
     pub sum: f32,
     pub overlap: f32,
-    /// What the receiver's own tree leaves of it.
-    pub own: f32,
 }
 
-/// The ray of light to a receiver. Its own tree takes exp(−τ s/scale) over the metres s to where the ray enters it; others
-/// shadow it if their back lies nearer the sun than that (`shaders/frame/tree_shade.glsl`).
+/// What a receiver's own tree leaves of the light, exp(−τ s/scale) over the metres s to where the ray enters it, and s.
+#[inline]
+pub fn own<C: Crown>(
+    crown: &C,
+    patch: &Patch,
+    heading: &Heading<C::Aim>,
+    azimuth: &Azimuth,
+    receiver: &Receiver,
+) -> (f32, f32) {
+    let Some(tree) = &receiver.tree else { return (1.0, 0.0) };
+    // Across the torus the point may lie near another image of its tree.
+    let offset = [0, 1].map(|k| {
+        let d = receiver.position[k] - tree.position[k];
+        d - (d / patch.side).round() * patch.side
+    });
+    let Some(met) = at_tree(crown, heading, azimuth, tree, offset, receiver.z) else { return (1.0, 0.0) };
+    let Some(depth) = crown.entry(&heading.aims[met.step as usize], met.a, met.b) else { return (1.0, 0.0) };
+    let metres = ((depth - met.depth) * met.metres).max(0.0);
+    ((-crown.shape().extinction / tree.scale * metres).exp(), metres)
+}
+
+/// The ray of light to a receiver, past its own tree, which it enters after `entry` m: others shadow it if their back lies
+/// nearer the sun than that (`shaders/frame/tree_shade.glsl`).
 #[inline]
 pub fn light<C: Crown, const M: usize>(
     crown: &C,
     patch: &Patch,
     heading: &Heading<C::Aim>,
     azimuth: &Azimuth,
-    (receiver, marks): (&Receiver, &Marks),
+    (receiver, entry, marks): (&Receiver, f32, &Marks),
     q: &[f32; M],
     largest: f32,
 ) -> Light<M> {
-    let mut light = Light { alone: [1.0; M], joint: [1.0; M], sum: 0.0, overlap: 0.0, own: 1.0 };
-    let (mut entry, mut own) = (0.0, u32::MAX);
-    if let Some(tree) = &receiver.tree {
-        own = tree.index;
-        // Across the torus the point may lie near another image of its tree.
-        let offset = [0, 1].map(|k| {
-            let d = receiver.position[k] - tree.position[k];
-            d - (d / patch.side).round() * patch.side
-        });
-        if let Some(met) = at_tree(crown, heading, azimuth, tree, offset, receiver.z)
-            && let Some(depth) = crown.entry(&heading.aims[met.step as usize], met.a, met.b)
-        {
-            entry = ((depth - met.depth) * met.metres).max(0.0);
-            light.own = (-crown.shape().extinction / tree.scale * entry).exp();
-        }
-    }
+    let mut light = Light { alone: [1.0; M], joint: [1.0; M], sum: 0.0, overlap: 0.0 };
+    let own = receiver.tree.map_or(u32::MAX, |t| t.index);
     let segment = Segment {
         origin: receiver.position,
         along: azimuth.along,
