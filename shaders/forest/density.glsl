@@ -1,8 +1,10 @@
 // Local density of a species. Needs `densities` (one layer a map) and `species` to be declared before.
 
+layout(constant_id = 2) const uint DENSITY_MAPS = 1u; // 0: no species has a map
+
 // Relative density of the map at a position, bilinear between texel centres; 1 without a map.
 float density_map(Species s, vec2 position, vec2 extent) {
-    if (s.density_layer == NO_PAGE) return 1.0;
+    if (DENSITY_MAPS == 0u || s.density_layer == NO_PAGE) return 1.0;
     vec2 t = clamp(position / extent, 0.0, 1.0) * s.map_size - 0.5;
     vec2 cell = floor(t), f = t - cell;
     ivec2 last = ivec2(s.map_size) - 1;

@@ -20,7 +20,7 @@ use super::terrain::{TerrainData, TerrainDraws};
 use crate::Result;
 use crate::gpu::interface::{
     COVER_GUTTER, COVER_LEVELS, COVER_SCRATCH, CoverageParameters, CoverageSplat, CoverageTile,
-    SeedParameters, SeedQuad,
+    SeedParameters, SeedQuad, TERRAIN_CELLS,
 };
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Program, Recorder, Resource, Sampler, shaders, vk};
 use crate::plan::Plan;
@@ -32,8 +32,9 @@ const LEAST_TEXEL: f64 = 0.35;
 const LEAST_RADIUS_PART: f64 = 0.1;
 /// Discs of a smaller part of a texel are not drawn (BN12, section 4).
 const LEAST_DISC: f64 = 1.0 / 16.0;
-/// Smallest radius of a mean disc on the grid on which discs are drawn, in cells of that grid.
-const LEAST_RADIUS: f64 = 0.55;
+/// Smallest radius of a mean disc on the grid on which discs are drawn, in cells of that grid: discs side by side share
+/// cells, in which the product of what each leaves open takes too much off, 2 % of discs of this radius.
+const LEAST_RADIUS: f64 = 1.0;
 /// Most workgroups a dispatch.
 const MOST_GROUPS: u32 = 32768;
 /// Texels along a side of a workgroup's block.
@@ -54,10 +55,7 @@ struct Push {
 pub struct CoverageData {
     /// The tiles, `groups` layers a slot: coverage, then a channel a species.
     pub tiles: Image,
-    /// Layers a slot.
-    pub groups: u32,
-    /// Key of the tile in each slot and in use this frame, for tests.
-    pub held: Vec<(QuadKey, u32)>,
+    groups: u32,
     cache: SlotCache<QuadKey>,
     sums: Buffer,
     quads: Buffer,
@@ -129,7 +127,7 @@ impl CoverageData {
         let least = LEAST_TEXEL.max(LEAST_RADIUS_PART * smallest);
         let inner = f64::from(size - 2 * COVER_GUTTER);
         let finest = (0..tree.levels()).rev().find(|l| tree.side(*l) / inner >= least).unwrap_or(0);
-        let constants = [(0, size), (1, scene.species.len() as u32)];
+        let constants = [(0, size), (1, scene.species.len() as u32), (2, species.map_count)];
         let texels = u64::from(size) * u64::from(size);
         // Zeros, as the production leaves them.
         let sums =
@@ -145,19 +143,23 @@ impl CoverageData {
                 usage: vk::ImageUsageFlags::STORAGE,
             })?,
             groups: plan.cover_groups,
-            held: Vec::new(),
             cache: SlotCache::new(plan.cover_slots),
             sums,
             quads: gpu.buffer("coverage quads", 0)?,
             splats: gpu.buffer("coverage splats", 0)?,
             jobs: gpu.buffer("coverage jobs", 0)?,
-            splat: gpu.compute(&shaders::FOREST_COVERAGE_SPLAT_COMP, &constants[..1])?,
+            splat: gpu.compute(&shaders::FOREST_COVERAGE_SPLAT_COMP, &constants)?,
             resolve: gpu.compute(&shaders::FOREST_COVERAGE_RESOLVE_COMP, &constants)?,
             finest,
             disc: if weight > 0.0 { area / weight } else { 0.0 },
             reach,
             smooth,
         })
+    }
+
+    /// First layer of the tile of a quad, if this frame uses it.
+    pub fn layer(&self, key: &QuadKey) -> Option<u32> {
+        self.cache.find(key).map(|slot| slot * self.groups)
     }
 
     /// Gives each quad that the camera draws its tile, and says which tiles are to be produced.
@@ -173,7 +175,6 @@ impl CoverageData {
     ) -> Result<CoverageWork> {
         let keys = self.choose(&draws.keys);
         self.cache.begin_frame();
-        self.held.clear();
         let (mut jobs, mut quads, mut splats) = (Vec::new(), Vec::new(), Vec::new());
         let mut work = CoverageWork::default();
         let (mut batch, mut words) = (Batch::default(), 0);
@@ -186,8 +187,7 @@ impl CoverageData {
                 [0, 1].map(|k| f64::from(quad.corner[k]) * tree.step() - f64::from([key.x, key.y][k]) * own);
             let size = f64::from(self.tiles.size()[0]);
             quad.cover_offset = corner.map(|c| ((c / texel + f64::from(COVER_GUTTER)) / size) as f32);
-            let side =
-                f64::from(quad.spacing) * f64::from(crate::gpu::interface::TERRAIN_CELLS) * tree.step();
+            let side = f64::from(quad.spacing) * f64::from(TERRAIN_CELLS) * tree.step();
             quad.cover_scale = (side / texel / size) as f32;
             quad.cover_layer = slot.index * self.groups;
             quad.cover_disc = (self.disc / (texel * texel)).max(1e-30).log2() as f32;
@@ -249,9 +249,9 @@ impl CoverageData {
         let ratio = self.disc / (texel * texel);
         let radius = (ratio / std::f64::consts::PI).sqrt();
         let fine = [1, 2, 4].into_iter().find(|f| f64::from(*f) * radius >= LEAST_RADIUS).unwrap_or(4);
-        // Densities are interpolated over a sixth of what they change in, at most; and averaged from half of it on.
+        // Densities are interpolated over a third of what they change in, at most; and averaged from half of it on.
         let step =
-            [16, 8, 4, 2].into_iter().find(|s| f64::from(*s) * texel <= self.smooth / 6.0).unwrap_or(1);
+            [16, 8, 4, 2].into_iter().find(|s| f64::from(*s) * texel <= self.smooth / 3.0).unwrap_or(1);
         let samples = [1, 2].into_iter().find(|n| texel <= f64::from(*n) * 0.5 * self.smooth).unwrap_or(4);
         let tile = CoverageTile {
             cell: cell.map(|c| c as i32),

@@ -4,13 +4,13 @@ use std::collections::HashMap;
 
 use super::cache::SlotCache;
 use super::quadtree::{Bounds, Quadtree};
-use super::species::SpeciesData;
+use super::species::{SpeciesData, density_map_size};
 use super::terrain::TerrainData;
 use crate::frame::camera::Eye;
 use crate::gpu::interface::{DrawCommand, ListedTree, Seed, SeedParameters, SeedQuad};
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
 use crate::plan::Plan;
-use crate::scene::{Distribution, Scene};
+use crate::scene::{Distribution, Scene, Species};
 use crate::{Error, Result};
 
 /// Seeds of the quads near the camera.
@@ -66,6 +66,8 @@ impl SeedData {
             .collect();
         let pattern = plan.pattern.as_ref().map_or_else(Vec::new, |p| p.packed());
         let heights = scene.terrain.heights.is_some();
+        let mapped = |s: &&Species| density_map_size(s, scene.terrain.extent).is_some();
+        let maps = scene.species.iter().filter(mapped).count() as u32;
         Ok(SeedData {
             seeds: gpu.buffer("seeds", slots * size_of::<Seed>() as u64)?,
             draws: gpu
@@ -81,7 +83,7 @@ impl SeedData {
             species_count: gpu.buffer_with("species count", &[scene.species.len() as u32])?,
             listed_ranges,
             cache: SlotCache::new(plan.seed_regions),
-            program: gpu.compute(&shaders::FOREST_SEEDS_COMP, &[])?,
+            program: gpu.compute(&shaders::FOREST_SEEDS_COMP, &[(2, maps)])?,
             parameters: SeedParameters {
                 extent: scene.terrain.extent.map(|e| e as f32),
                 quad_side: plan.quad_side as f32,

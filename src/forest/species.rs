@@ -31,6 +31,8 @@ pub struct SpeciesData {
     pub mask_rows: u32,
     /// Density maps, also of listed trees, one a layer.
     pub densities: Image,
+    /// Number of density maps.
+    pub map_count: u32,
 }
 
 impl SpeciesData {
@@ -64,12 +66,13 @@ impl SpeciesData {
             scene.species.iter().map(|s| density_map(s, scene.terrain.extent)).collect();
         let mut rows = rows(scene, plan, baked, &maps, view_count);
         let maps: Vec<&Raster> = maps.iter().flatten().map(|m| m.relative.as_ref()).collect();
+        let map_count = maps.len() as u32;
         let size = maps.iter().fold([1, 1], |s: [u32; 2], m| [s[0].max(m.width), s[1].max(m.height)]);
         let densities = gpu.image(&ImageDesc {
             name: "density maps",
             format: vk::Format::R32_SFLOAT,
             size,
-            layers: (maps.len() as u32).max(1),
+            layers: map_count.max(1),
             levels: 1,
             samples: 1,
             usage: vk::ImageUsageFlags::empty(),
@@ -95,6 +98,7 @@ impl SpeciesData {
             mask_rows: masks.len() as u32,
             masks: gpu.buffer_with("sample masks", &masks)?,
             densities,
+            map_count,
         })
     }
 }

@@ -124,6 +124,11 @@ impl Renderer {
         &self.plan
     }
 
+    /// The ground: its quadtree and its tiles.
+    pub fn terrain(&self) -> &TerrainData {
+        &self.terrain
+    }
+
     /// What lives between frames for the trees.
     pub fn forest(&self) -> Option<&Forest> {
         self.forest.as_ref()

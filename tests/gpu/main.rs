@@ -3,6 +3,7 @@
 #[path = "../common/device.rs"]
 mod device;
 
+mod coverage;
 mod cull;
 mod determinism;
 mod extremes;

@@ -79,7 +79,14 @@ fn without_trees_there_is_no_forest() {
     let mut scene = scene();
     let forest = draw(&gpu, &scene);
     let tree_passes = ["seeds", "coverage tiles", "cull", "prefix sums", "draw commands", "compact", "trees"];
-    let tree_items = ["z-field views of a", "seeds", "coverage tiles", "point pattern", "trees and lists"];
+    let tree_items = [
+        "z-field views of a",
+        "seeds",
+        "coverage tiles",
+        "coverage sums",
+        "point pattern",
+        "trees and lists",
+    ];
     assert!(tree_passes.iter().all(|p| forest.draws(p)), "{:?}", forest.passes);
     assert!(tree_items.iter().all(|p| forest.has(p)), "{:?}", forest.items);
     if let Distribution::Density { max_density, .. } = &mut scene.species[0].distribution {
@@ -90,7 +97,7 @@ fn without_trees_there_is_no_forest() {
     for bare in [thinned, draw(&gpu, &scene)] {
         assert!(!tree_passes.iter().any(|p| bare.draws(p)), "{:?}", bare.passes);
         assert!(!tree_items.iter().any(|p| bare.has(p)), "{:?}", bare.items);
-        for name in ["seeds", "trees", "z-field views", "coverage tiles"] {
+        for name in ["seeds", "trees", "z-field views", "coverage tiles", "coverage sums"] {
             assert_eq!(bare.bytes(name), 0, "{name}");
         }
         assert!(bare.draws("shadows"), "the ground still casts");
@@ -108,11 +115,26 @@ fn a_listed_forest_needs_no_pattern_and_a_plain_no_height_map() {
     scene.species[0].distribution = Distribution::Positions(vec![tree; 1].into());
     let listed = draw(&gpu, &scene);
     assert!(!listed.has("point pattern") && listed.draws("seeds"));
+    assert!(listed.has("density maps"), "how densely listed trees stand");
     let (width, height) = (11, 11);
     scene.terrain.heights = Some(canopy::scene::Raster { width, height, samples: vec![1.0; 121] });
     scene.terrain.cell_size = 30.0;
     assert!(draw(&gpu, &scene).has("height map"));
     gpu.close().unwrap();
+}
+
+#[test]
+fn a_range_beyond_the_terrain_does_not_coarsen_the_seed_quads() {
+    let mut scene = scene();
+    scene.terrain.extent = [400.0; 2];
+    scene.settings.set("zfield_min_pixels", 0.25).unwrap();
+    let far = canopy::scene::Camera { vertical_fov: 1.0, ..scene.cameras[0].clone() };
+    let plan = |camera| Plan::new(&scene, camera, [640, 480], false, None).unwrap();
+    let (near, far) = (plan(&scene.cameras[0]), plan(&far));
+    assert!(far.range > 1e5 && near.range > 1e3, "{} {}", near.range, far.range);
+    // Four Wang tiles of 256 points, 0.03 a square metre: 370 m. A range of 10^5 m is 24 quads of 5 km.
+    assert!(far.quad_side < 400.0 && near.quad_side == far.quad_side, "{} {}", near.quad_side, far.quad_side);
+    assert_eq!(far.seed_regions, 4, "every quad that exists");
 }
 
 #[test]

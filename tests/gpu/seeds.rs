@@ -12,10 +12,10 @@ use canopy::scene::{Camera, Distribution, Raster, Scene, TreePosition};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-const SIZE: [u32; 2] = [48, 48];
+pub(super) const SIZE: [u32; 2] = [48, 48];
 
 /// A level plain with two species, for everything to be seen from above.
-fn plain(side: f64, densities: [f64; 2]) -> Scene {
+pub(super) fn plain(side: f64, densities: [f64; 2]) -> Scene {
     let mut scene = device::small_scene(&format!(
         "seed = 9\n[terrain]\nextent = {side:?}\nalbedo = 0.2\n\
          [[species]]\nname = \"a\"\nmodel = \"builtin:birch\"\ndensity = {:?}\nscale = [0.9, 1.1]\n\
@@ -28,7 +28,7 @@ fn plain(side: f64, densities: [f64; 2]) -> Scene {
     scene
 }
 
-fn hills(scene: &mut Scene) {
+pub(super) fn hills(scene: &mut Scene) {
     let (width, height) = (31u32, 31);
     let samples = (0..width * height)
         .map(|k| (60.0 * (f64::from(k % width) * 0.4).sin() * (f64::from(k / width) * 0.3).cos()) as f32)
@@ -38,13 +38,13 @@ fn hills(scene: &mut Scene) {
 }
 
 /// From above the middle, the whole terrain in view.
-fn above(scene: &Scene) -> Camera {
+pub(super) fn above(scene: &Scene) -> Camera {
     let [x, y] = scene.terrain.extent.map(|e| 0.5 * e);
     Camera { vertical_fov: 120.0, ..device::camera([x, y, 0.6 * scene.terrain.extent[0]], [x, y, 0.0]) }
 }
 
 /// The seeds of every visible quad, by the quad's column and row.
-fn seeds(gpu: &Gpu, scene: &Scene, renderer: &Renderer) -> BTreeMap<(i64, i64), Vec<Seed>> {
+pub(super) fn seeds(gpu: &Gpu, scene: &Scene, renderer: &Renderer) -> BTreeMap<(i64, i64), Vec<Seed>> {
     let (forest, plan) = (renderer.forest().unwrap(), renderer.plan());
     let capacity = forest.seeds.region_capacity as usize;
     let counts: Vec<DrawCommand> = gpu.read(&forest.seeds.draws, 0, plan.seed_regions as usize).unwrap();
@@ -76,7 +76,7 @@ fn produce(gpu: &Gpu, scene: &Scene) -> (BTreeMap<(i64, i64), Vec<Seed>>, Plan) 
 }
 
 /// Positions from the south-west corner of the terrain.
-fn positions(all: &BTreeMap<(i64, i64), Vec<Seed>>, side: f64) -> Vec<([f64; 2], Seed)> {
+pub(super) fn positions(all: &BTreeMap<(i64, i64), Vec<Seed>>, side: f64) -> Vec<([f64; 2], Seed)> {
     all.iter()
         .flat_map(|((x, y), seeds)| {
             let corner = [*x as f64 * side, *y as f64 * side];
