@@ -8,6 +8,7 @@ const uint CAMERA_DRAWS = 4u;          // draws of the camera's list: near, midd
 const uint CULL_GROUP = 256u;         // seeds a workgroup of the cull
 const uint TERRAIN_CELLS = 32u;       // mesh cells along a side of a terrain quad
 const uint TERRAIN_HEIGHTS = 33u;     // height samples along a side of a terrain tile
+const uint FOREST_NODES = 17u;        // shader-map nodes along a side of a terrain quad: every second vertex
 const uint TERRAIN_SLOPES = 65u;      // slope samples along a side of a terrain tile
 const uint NO_PAGE = 0xffffffffu;     // no layer of a texture array
 const uint COVER_GUTTER = 8u;         // texels around a coverage tile's quad on each side: one of mip 3
@@ -44,7 +45,7 @@ struct View {
     float hole_radius;                // radius of the hole around a tree times sqrt(density), BN12 eq. 9
 };
 
-// One species.
+// One species. Bound as a uniform block: without arrays, and with a vec3 in it, std140 and std430 agree.
 struct Species {
     vec3 scale_to_metres;             // S: half extents of the tree box, m
     float centre;                     // height of the box's centre o above the trunk base, m
@@ -185,6 +186,21 @@ struct TerrainQuad {
     uint cover_layer;                 // first layer of its coverage tile; NO_PAGE: no trees
     float cover_disc;                 // log2 of the mean disc area in texels of that tile
     float cover_floor;                // 1: the tile is the quad's own, and fades to its mip 1 where the quad morphs
+};
+
+// The shader-map at a node of a terrain quad's grid: what depends on directions and slope, per optical thickness of the
+// crowns from above (sum of density times mean area), which the pixel knows better.
+struct ForestNode {
+    vec3 tree_sun;                    // radiance of the shader-map's trees from the sun
+    float tree_lit;                   // k_t / (k_t + k_t-bar)
+    vec3 tree_sky;                    // their radiance from the sky
+    float converged;                  // nu of BN12 eq. 24 and 25
+    float over;                       // path through the crowns of trees that the shader-map shows, over the thickness
+    float seen;                       // path through all crowns towards the viewer, over the thickness
+    float joint;                      // path towards viewer and sun
+    float seen_coverage;              // mean coverage by discs where ground is seen
+    float sky;                        // -ln D over the thickness
+    float gap;                        // -ln(1 - C) over the thickness
 };
 
 // What the terrain takes.

@@ -201,7 +201,9 @@ impl Plan {
         let diagonal = scene.terrain.extent[0].hypot(scene.terrain.extent[1]);
         plan.shadow_distance = match f64::from(s.shadow_distance) {
             // Farther out the average light includes its shadows.
-            0.0 if plan.range > 0.0 => (f64::from(s.convergence) * plan.range).min(diagonal + eye.position[2].abs()),
+            0.0 if plan.range > 0.0 => {
+                (f64::from(s.convergence) * plan.range).min(diagonal + eye.position[2].abs())
+            }
             0.0 => diagonal,
             chosen => chosen,
         };

@@ -7,7 +7,7 @@
 
 const uint BLOCK = 16u;
 layout(local_size_x = 256) in;
-layout(std430, binding = 0) readonly buffer SpeciesTable { Species items[]; } species;
+layout(std140, binding = 0) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
 layout(std430, binding = 1) readonly buffer Tiles { CoverageTile items[]; } tiles;
 layout(std430, binding = 2) buffer Sums { uint items[]; } sums;
 layout(binding = 3) uniform sampler2DArray heights;

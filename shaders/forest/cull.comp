@@ -11,7 +11,7 @@ layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(std430, binding = 1) readonly buffer Quads { SeedQuad items[]; } quads;
 layout(std430, binding = 2) readonly buffer Draws { DrawCommand items[]; } draws;
 layout(std430, binding = 3) readonly buffer Seeds { Seed items[]; } seeds;
-layout(std430, binding = 4) readonly buffer SpeciesTable { Species items[]; } species;
+layout(std140, binding = 4) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
 layout(std430, binding = 5) writeonly buffer Classes { uint items[]; } classes;
 layout(std430, binding = 6) writeonly buffer Counts { uint items[]; } counts;
 layout(push_constant) uniform Push { CullParameters p; };

@@ -5,6 +5,10 @@
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec2 slope_at;
 layout(location = 2) flat in uint layer;
+layout(location = 6) in vec4 tree_sun;
+layout(location = 7) in vec4 tree_sky;
+layout(location = 8) in vec4 paths;
+layout(location = 9) in vec2 vertical;
 
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 3) uniform sampler2DArray slope_tiles;
@@ -13,7 +17,8 @@ layout(binding = 5) uniform sampler2DArray shadow_map;
 layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
 
 #include "frame/cover.glsl"
-#include "frame/shader_map.glsl"
+#include "physics/handover.glsl"
+layout(constant_id = 5) const bool HAS_SUN = true;
 
 struct GroundLight {
     vec3 sun, sky;  // parts of the radiance
@@ -43,19 +48,22 @@ GroundLight ground_light() {
     float distance = length(position);
     float cosine = max(dot(n, view.v.sun_direction), 0.0);
     Cover c = cover();
-    ForestPixel f = shader_map(position * (-1.0 / max(distance, 1e-6)), n, distance, c);
-    float coverage = mix(f.expected, c.channels[0].x, c.resolved);
-    float lit = HAS_SUN ? mix(shadow_maps(n, cosine, distance), f.ground_lit, f.converged) : 0.0;
-    float contrast = mix(ground_contrast(coverage, f.expected, view.v.ground_contrast),
-                         ground_contrast(f.seen_coverage, f.expected, view.v.ground_contrast), f.converged);
-    float open = open_ground(f.over, f.share, coverage, f.expected);
+    // What the nodes know per thickness, times the pixel's own.
+    float thickness = total_thickness(c);
+    float expected = 1.0 - exp(-thickness * vertical.y), nu = thickness > 0.0 ? tree_sky.w : 0.0;
+    float ground_lit = exp(thickness * min(paths.y - paths.z, 0.0));
+    float coverage = mix(expected, c.channels[0].x, c.resolved);
+    float lit = HAS_SUN ? mix(shadow_maps(n, cosine, distance), ground_lit, nu) : 0.0;
+    float contrast = mix(ground_contrast(coverage, expected, view.v.ground_contrast),
+                         ground_contrast(paths.w, expected, view.v.ground_contrast), nu);
+    float open = open_ground(thickness * paths.x, paths.x / max(paths.y, 1e-9), coverage, expected);
     GroundLight g;
     vec3 sun = reflectance * (cosine * lit / PI) * view.v.sun_irradiance;
-    vec3 sky = reflectance * (0.5 * (1.0 + n.z) * f.sky * contrast) * view.v.sky_radiance;
-    g.sun = mix(f.tree_sun, sun, open);
-    g.sky = mix(f.tree_sky, sky, open);
+    vec3 sky = reflectance * (0.5 * (1.0 + n.z) * exp(-thickness * vertical.x) * contrast) * view.v.sky_radiance;
+    g.sun = mix(tree_sun.rgb, sun, open);
+    g.sky = mix(tree_sky.rgb, sky, open);
     g.trees = 1.0 - open;
     if (cosine <= 0.0) lit = 0.0;
-    g.fractions = vec4(open * vec2(lit, 1.0 - lit), (1.0 - open) * vec2(f.tree_lit, 1.0 - f.tree_lit));
+    g.fractions = vec4(open * vec2(lit, 1.0 - lit), (1.0 - open) * vec2(tree_sun.w, 1.0 - tree_sun.w));
     return g;
 }

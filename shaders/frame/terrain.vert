@@ -3,6 +3,10 @@
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
 #include "frame/terrain.glsl"
+#include "frame/forest_node.glsl"
+
+layout(std430, binding = 7) readonly buffer Nodes { ForestNode items[]; } nodes;
+layout(constant_id = 0) const uint COVER_LAYERS = 0u;
 
 layout(location = 0) out vec3 position;
 layout(location = 1) out vec2 slope_at;
@@ -10,6 +14,15 @@ layout(location = 2) flat out uint layer;
 layout(location = 3) out vec3 cover_at;
 layout(location = 4) flat out float cover_disc;
 layout(location = 5) flat out uint cover_layer;
+layout(location = 6) out vec4 tree_sun;   // w: lit fraction of trees
+layout(location = 7) out vec4 tree_sky;   // w: nu
+layout(location = 8) out vec4 paths;      // over, seen, joint; w: coverage where ground is seen
+layout(location = 9) out vec2 vertical;   // sky, gap
+
+ForestNode forest_node(ivec2 at) {
+    uint quad = uint(gl_InstanceIndex) * FOREST_NODES * FOREST_NODES;
+    return nodes.items[quad + uint(at.y) * FOREST_NODES + uint(at.x)];
+}
 
 void main() {
     TerrainQuad q = quads.items[p.first_quad + gl_InstanceIndex];
@@ -22,4 +35,18 @@ void main() {
     cover_disc = q.cover_disc;
     cover_layer = q.cover_layer;
     gl_Position = view.v.clip_from_world * vec4(position, 1.0);
+    tree_sun = tree_sky = paths = vec4(0.0);
+    vertical = vec2(0.0);
+    if (COVER_LAYERS > 0u) {
+        // Every second vertex is a node; the others are between two, but for how far they have morphed to one.
+        ivec2 at = ivec2(gl_VertexIndex % TERRAIN_HEIGHTS, gl_VertexIndex / TERRAIN_HEIGHTS);
+        ivec2 low = at >> 1, high = (at + 1) >> 1;
+        float between = 0.5 * (1.0 - place.z);
+        ForestNode f = mix_nodes(mix_nodes(forest_node(low), forest_node(ivec2(high.x, low.y)), between),
+                                 mix_nodes(forest_node(ivec2(low.x, high.y)), forest_node(high), between), between);
+        tree_sun = vec4(f.tree_sun, f.tree_lit);
+        tree_sky = vec4(f.tree_sky, f.converged);
+        paths = vec4(f.over, f.seen, f.joint, f.seen_coverage);
+        vertical = vec2(f.sky, f.gap);
+    }
 }

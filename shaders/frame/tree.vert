@@ -10,7 +10,7 @@
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(std430, binding = 1) readonly buffer Trees { Tree items[]; } trees;
 layout(std430, binding = 2) readonly buffer Lists { uint items[]; } lists;
-layout(std430, binding = 3) readonly buffer SpeciesTable { Species items[]; } species;
+layout(std140, binding = 3) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
 layout(std430, binding = 4) readonly buffer Bases { ViewBasis items[]; } bases;
 layout(std430, binding = 5) readonly buffer Masks { uvec4 items[]; } masks;
 layout(constant_id = 0) const int RINGS = 9;

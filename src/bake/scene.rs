@@ -28,7 +28,8 @@ pub struct BakedFrom {
 /// Full density of the point pattern that a scene's densities thin, trees per m²; or, in a scene of lists only, of the lists.
 pub fn pattern_density(scene: &Scene) -> f64 {
     let [width, height] = scene.terrain.extent;
-    let sum = |of: &dyn Fn(&Distribution) -> f64| scene.species.iter().map(|s| of(&s.distribution)).sum::<f64>();
+    let sum =
+        |of: &dyn Fn(&Distribution) -> f64| scene.species.iter().map(|s| of(&s.distribution)).sum::<f64>();
     let thinned = sum(&|d| match d {
         Distribution::Density { max_density, .. } => f64::from(*max_density),
         Distribution::Positions(_) => 0.0,

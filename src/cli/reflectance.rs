@@ -26,9 +26,28 @@ A list is numbers and ranges FROM:TO:STEP, with commas between. A negative view 
 positive slope descends towards the sun. Pixels are those of --size and --camera.";
 
 const COLUMNS: [&str; 22] = [
-    "representation", "distance_m", "sun_zenith_deg", "view_zenith_deg", "relative_azimuth_deg", "slope_deg", "k_lit_ground",
-    "k_shadowed_ground", "k_lit_tree", "k_shadowed_tree", "radiance_r", "radiance_g", "radiance_b", "sun_r", "sun_g", "sun_b",
-    "sky_r", "sky_g", "sky_b", "stderr_r", "stderr_g", "stderr_b",
+    "representation",
+    "distance_m",
+    "sun_zenith_deg",
+    "view_zenith_deg",
+    "relative_azimuth_deg",
+    "slope_deg",
+    "k_lit_ground",
+    "k_shadowed_ground",
+    "k_lit_tree",
+    "k_shadowed_tree",
+    "radiance_r",
+    "radiance_g",
+    "radiance_b",
+    "sun_r",
+    "sun_g",
+    "sun_b",
+    "sky_r",
+    "sky_g",
+    "sky_b",
+    "stderr_r",
+    "stderr_g",
+    "stderr_b",
 ];
 
 #[derive(clap::Args)]
@@ -128,9 +147,19 @@ pub fn run(args: &Args) -> Result<()> {
     }
     if args.print.json {
         let command = "reflectance";
-        output::json(&Report { schema_version: SCHEMA_VERSION, command, scene: &scene.name, densities: &densities, rows: &rows })
+        output::json(&Report {
+            schema_version: SCHEMA_VERSION,
+            command,
+            scene: &scene.name,
+            densities: &densities,
+            rows: &rows,
+        })
     } else if let Some(out) = &args.out {
-        if args.print.quiet { Ok(()) } else { output::print(&format!("{} rows in {}\n", rows.len(), out.display())) }
+        if args.print.quiet {
+            Ok(())
+        } else {
+            output::print(&format!("{} rows in {}\n", rows.len(), out.display()))
+        }
     } else {
         output::print(&text)
     }
@@ -245,7 +274,9 @@ fn list(text: &str) -> std::result::Result<List, String> {
                 let (from, to, step) = (number(from)?, number(to)?, number(step)?);
                 let count = ((to - from) / step + 1e-9).floor();
                 if !(0.0..10_000.0).contains(&count) {
-                    return Err(format!("\"{part}\" does not lead from {from} to {to} in at most 10,000 steps"));
+                    return Err(format!(
+                        "\"{part}\" does not lead from {from} to {to} in at most 10,000 steps"
+                    ));
                 }
                 all.extend((0..=count as u32).map(|k| from + f64::from(k) * step));
             }

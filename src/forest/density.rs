@@ -23,7 +23,8 @@ pub fn local(distribution: &Distribution, terrain: &Terrain, x: f64, y: f64) -> 
     }
     if let Some([low, high]) = between_heights.map(|b| b.map(f64::from)) {
         let soft = f64::from(HEIGHT_SOFTNESS) * (high - low);
-        density *= smoothstep(low - soft, low + soft, height) * (1.0 - smoothstep(high - soft, high + soft, height));
+        density *=
+            smoothstep(low - soft, low + soft, height) * (1.0 - smoothstep(high - soft, high + soft, height));
     }
     if let Some(limit) = below_slope {
         let (t, slope) = (f64::from(limit.to_radians().tan()), dx.hypot(dy) / terrain.cell_size);

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use super::density::{HEIGHT_SOFTNESS, SLOPE_SOFTNESS};
 use super::listed;
 use crate::bake::{Baked, ZField};
-use crate::gpu::interface::{NO_PAGE, Species as Row, ViewBasis};
+use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
 use crate::physics::masks::combination_table;
 use crate::physics::views;
@@ -64,7 +64,7 @@ impl SpeciesData {
         let bases: Vec<ViewBasis> = baked.iter().flat_map(|b| view_bases(&b.species.views)).collect();
         let maps: Vec<Option<Map>> =
             scene.species.iter().map(|s| density_map(s, scene.terrain.extent)).collect();
-        let mut rows = rows(scene, plan, baked, &maps, view_count);
+        let rows = rows(scene, plan, baked, &maps, view_count);
         let maps: Vec<&Raster> = maps.iter().flatten().map(|m| m.relative.as_ref()).collect();
         let map_count = maps.len() as u32;
         let size = maps.iter().fold([1, 1], |s: [u32; 2], m| [s[0].max(m.width), s[1].max(m.height)]);
@@ -85,12 +85,14 @@ impl SpeciesData {
             }
             gpu.upload_image(&densities, 0, layer as u32, 1, bytemuck::cast_slice(&padded))?;
         }
-        if rows.is_empty() {
-            rows.push(bytemuck::Zeroable::zeroed());
-        }
         let masks = combination_table(plan.samples);
         Ok(SpeciesData {
-            table: gpu.buffer_with("species", &rows)?,
+            table: {
+                // A uniform block has its whole size.
+                let mut block = rows.clone();
+                block.resize(MAX_SPECIES as usize, bytemuck::Zeroable::zeroed());
+                gpu.buffer_with("species", &block)?
+            },
             rows,
             count: scene.species.len() as u32,
             views: texels,

@@ -32,7 +32,8 @@ impl TableData {
         }
         let count = (tables.len() as u32).max(1);
         // At least two slices, or it would not be a volume.
-        let pairs = gpu.volume("pair tables", vk::Format::R16G16B16A16_SFLOAT, [n, n, (count * n * m).max(2)])?;
+        let pairs =
+            gpu.volume("pair tables", vk::Format::R16G16B16A16_SFLOAT, [n, n, (count * n * m).max(2)])?;
         let half = |v: f32| f16::from_f32(v).to_bits();
         let mut texels: Vec<u16> = tables
             .iter()

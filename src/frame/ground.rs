@@ -1,13 +1,13 @@
 //! The terrain pass.
 
+use super::Forest;
+use super::shader_map::ShaderMap;
 use super::shadows::TerrainPush;
 use super::targets::ImageTargets;
 use crate::Result;
-use super::Forest;
 use crate::forest::coverage;
-use crate::forest::tables::TableData;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
-use crate::gpu::interface::{Species, TERRAIN_CELLS, TERRAIN_HEIGHTS};
+use crate::gpu::interface::{ForestNode, TERRAIN_CELLS, TERRAIN_HEIGHTS};
 use crate::gpu::{
     Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler,
     Targets, shaders, vk,
@@ -21,8 +21,7 @@ pub struct Ground {
     program: Program,
     /// Stands for coverage tiles in scenes without trees.
     no_coverage: Image,
-    no_species: Buffer,
-    no_tables: TableData,
+    no_nodes: Buffer,
 }
 
 impl Ground {
@@ -30,10 +29,9 @@ impl Ground {
     ///
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
-    pub fn new(gpu: &Gpu, plan: &Plan, forest: Option<&Forest>) -> Result<Self> {
+    pub fn new(gpu: &Gpu, plan: &Plan) -> Result<Self> {
         let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
         let side = TERRAIN_HEIGHTS;
-        let float = |n: u32| (n as f32).to_bits();
         let cells =
             (0..TERRAIN_CELLS * TERRAIN_CELLS).map(|k| (k % TERRAIN_CELLS) + side * (k / TERRAIN_CELLS));
         // Diagonals run the same way at every level, so that a morphed quad is the coarser one exactly.
@@ -54,10 +52,7 @@ impl Ground {
                 blend: Blend::Replace,
                 constants: &[
                     (0, plan.cover_groups),
-                    (1, float(plan.coverage_size)),
-                    (2, forest.map_or(0, |f| f.species.count)),
-                    (3, float(forest.map_or(1, |f| f.tables.angles))),
-                    (4, float(forest.map_or(1, |f| f.tables.densities))),
+                    (1, (plan.coverage_size as f32).to_bits()),
                     (5, u32::from(plan.cascades > 0)),
                 ],
             })?,
@@ -70,8 +65,7 @@ impl Ground {
                 samples: 1,
                 usage: vk::ImageUsageFlags::empty(),
             })?,
-            no_species: gpu.buffer("no species", size_of::<Species>() as u64)?,
-            no_tables: TableData::new(gpu, &[])?,
+            no_nodes: gpu.buffer("no nodes", size_of::<ForestNode>() as u64)?,
         })
     }
 
@@ -82,7 +76,7 @@ impl Ground {
         recorder: &mut Recorder,
         view: &Buffer,
         (terrain, draws): (&TerrainData, &TerrainDraws),
-        forest: Option<&Forest>,
+        forest: Option<(&Forest, &ShaderMap)>,
         shadow_map: &Image,
         targets: &ImageTargets,
         sky: Option<[f32; 3]>,
@@ -93,12 +87,15 @@ impl Ground {
             (_, 1) => sky.map(|c| [c[0], c[1], c[2], 0.0]),
             _ => sky.map(|_| [0.0; 4]),
         };
-        let colors: Vec<_> =
-            targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), forest.is_none())).collect();
+        let colors: Vec<_> = targets
+            .colors
+            .iter()
+            .enumerate()
+            .map(|(k, t)| t.attachment(color(k), forest.is_none()))
+            .collect();
         let depth = Some(targets.depth.attachment(Some([0.0; 4]), forest.is_none()));
-        let tiles = forest.map_or(&self.no_coverage, |f| &f.coverage.tiles);
-        let (tables, species) =
-            forest.map_or((&self.no_tables, &self.no_species), |f| (&f.tables, &f.species.table));
+        let (tiles, nodes) =
+            forest.map_or((&self.no_coverage, &self.no_nodes), |(f, map)| (&f.coverage.tiles, &map.nodes));
         recorder.render("terrain", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
             pass.bind(
                 &self.program,
@@ -110,9 +107,7 @@ impl Ground {
                     ("albedo", Resource::Texture(&terrain.albedo, Sampler::Linear)),
                     ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
                     ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
-                    ("pair_table", Resource::Texture(&tables.pairs, Sampler::Linear)),
-                    ("view_table", Resource::Texture(&tables.views, Sampler::Linear)),
-                    ("species", Resource::Buffer(species)),
+                    ("nodes", Resource::Buffer(nodes)),
                 ],
             );
             pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });

@@ -3,6 +3,7 @@
 pub mod camera;
 pub mod cascades;
 pub mod ground;
+pub mod shader_map;
 pub mod shadows;
 pub mod sky;
 pub mod targets;
@@ -28,6 +29,7 @@ use crate::scene::{Camera, Scene};
 use camera::Eye;
 use cascades::Cascade;
 use ground::Ground;
+use shader_map::ShaderMap;
 use shadows::Shadows;
 use sky::SkyPass;
 use targets::ImageTargets;
@@ -60,6 +62,7 @@ pub struct Renderer {
     targets: ImageTargets,
     terrain: TerrainData,
     ground: Ground,
+    shader_map: Option<ShaderMap>,
     shadows: Shadows,
     sky: Option<SkyPass>,
     tonemap: Tonemap,
@@ -107,7 +110,8 @@ impl Renderer {
             view: gpu.buffer("view", size_of::<View>() as u64)?,
             targets: ImageTargets::new(gpu, &plan)?,
             terrain,
-            ground: Ground::new(gpu, &plan, forest.as_ref())?,
+            ground: Ground::new(gpu, &plan)?,
+            shader_map: forest.as_ref().map(|f| ShaderMap::new(gpu, &plan, f)).transpose()?,
             shadows: Shadows::new(gpu, &scene, &plan)?,
             sky: SkyPass::new(gpu, &scene, &plan)?,
             tonemap: Tonemap::new(gpu, &plan)?,
@@ -191,7 +195,10 @@ impl Renderer {
         }
         let clear = self.sky.is_none().then(|| self.light.sky.map(|c| (c * self.light.scale) as f32));
         let shadow_map = &self.shadows.map;
-        let forest = self.forest.as_ref();
+        let forest = self.forest.as_ref().zip(self.shader_map.as_ref());
+        if let Some((forest, map)) = forest {
+            map.record(&mut recorder, &self.view, ground, forest);
+        }
         self.ground.record(&mut recorder, &self.view, ground, forest, shadow_map, &self.targets, clear);
         if let Some(forest) = &self.forest {
             forest.pass.record(&mut recorder, &self.view, forest, shadow_map, &self.targets);

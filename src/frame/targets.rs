@@ -81,12 +81,7 @@ impl ImageTargets {
     /// Colour attachments with and without layers.
     pub fn formats(layers: bool) -> &'static [(&'static str, gpu::vk::Format)] {
         if layers {
-            &[
-                ("sun part", RADIANCE),
-                ("sky part", RADIANCE),
-                ("species", SPECIES),
-                ("fractions", RADIANCE),
-            ]
+            &[("sun part", RADIANCE), ("sky part", RADIANCE), ("species", SPECIES), ("fractions", RADIANCE)]
         } else {
             &[("radiance", RADIANCE)]
         }

@@ -195,7 +195,11 @@ impl Gpu {
                         vk::ImageUsageFlags::empty()
                     },
             );
-        let aspect = if d.format == vk::Format::D32_SFLOAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
+        let aspect = if d.format == vk::Format::D32_SFLOAT {
+            vk::ImageAspectFlags::DEPTH
+        } else {
+            vk::ImageAspectFlags::COLOR
+        };
         // SAFETY: the device is alive; on failure the handles made so far are destroyed before returning.
         let image = unsafe {
             let handle = s.device.create_image(&create, None).map_err(device_error(d.name))?;

@@ -181,14 +181,17 @@ pub fn measure(
     let widest = request.views.iter().map(|v| v[0].abs()).fold(0.0, f64::max);
     // What the image shows, along the ground, and the trees around whose shadows fall into it.
     let shown = method.side * (0.5 / widest.to_radians().cos().max(0.1) + 0.1) + 2.0 * scene_plan.tallest;
-    let texel = shadow_texel(&patch, &scene_plan, &optics, request.distance).max(2.0 * shown / LARGEST_SHADOW_MAP);
+    let texel =
+        shadow_texel(&patch, &scene_plan, &optics, request.distance).max(2.0 * shown / LARGEST_SHADOW_MAP);
     let texels = (2.0 * shown / texel).max(64.0) as u32;
     patch.settings.cascades = 1;
     patch.settings.cascade_size = texels.next_power_of_two();
     let patch = Arc::new(patch);
     let centres = centres(method.patches, request.slope);
-    let eye = |view: [f64; 2], centre: [f64; 2]| eye(&patch.terrain, view, centre, away, method, pixels_at_1m);
-    let plan = Plan::for_eye(&patch, &eye([0.0, 0.0], centres[0]), true, request.representation, Some(gpu.info()))?;
+    let eye =
+        |view: [f64; 2], centre: [f64; 2]| eye(&patch.terrain, view, centre, away, method, pixels_at_1m);
+    let plan =
+        Plan::for_eye(&patch, &eye([0.0, 0.0], centres[0]), true, request.representation, Some(gpu.info()))?;
     let mut renderer = Renderer::new(gpu, patch.clone(), plan, baked)?;
     let mut results = Vec::new();
     for view in &request.views {
@@ -219,7 +222,14 @@ fn centres(count: u32, slope: f64) -> Vec<[f64; 2]> {
 }
 
 /// The viewer of a patch: the sun is in the south, positive zenith angles are on its side.
-fn eye(terrain: &Terrain, [zenith, azimuth]: [f64; 2], centre: [f64; 2], away: f64, m: &Method, pixels_at_1m: f64) -> Eye {
+fn eye(
+    terrain: &Terrain,
+    [zenith, azimuth]: [f64; 2],
+    centre: [f64; 2],
+    away: f64,
+    m: &Method,
+    pixels_at_1m: f64,
+) -> Eye {
     let (t, a) = (zenith.to_radians(), azimuth.to_radians());
     let v = [t.sin() * a.sin(), -t.sin() * a.cos(), t.cos()];
     let ground = crate::physics::terrain::height_at(terrain, centre[0], centre[1]);
@@ -233,7 +243,8 @@ fn eye(terrain: &Terrain, [zenith, azimuth]: [f64; 2], centre: [f64; 2], away: f
 /// Metres a texel of the shadow map at a distance from the scene's camera.
 fn shadow_texel(scene: &Scene, plan: &Plan, eye: &Eye, distance: f64) -> f64 {
     use crate::frame::shadows::Shadows;
-    let cascades = Shadows::cascades(scene, plan, eye, crate::frame::view::sun_direction(&scene.sun), eye.position[2]);
+    let cascades =
+        Shadows::cascades(scene, plan, eye, crate::frame::view::sun_direction(&scene.sun), eye.position[2]);
     cascades.iter().find(|c| distance <= c.far).or(cascades.last()).map_or(1.0, |c| c.texel)
 }
 
