@@ -64,7 +64,7 @@ const SMALL: ForestSettings = ForestSettings {
     pattern_density: 0.03,
     scale_range: [1.0, 1.0],
     poisson: true,
-    hole_radius: 2.0,
+    hole_radius: 0.5,
     light_iterations: 1,
     view_iterations: 2,
 };
@@ -186,6 +186,38 @@ fn light_on_spheres_is_the_closed_form() {
     }
 }
 
+/// E and Γ_v of Poisson spheres. From the zenith a point is seen on the sphere whose trunk is nearest; its squared distance u
+/// has the density λπ exp(−λπu), and lies r − √(r² − u) below the top. Visible ground that no disc covers is met by neither of
+/// two shadows, one of them straight down.
+#[test]
+fn sky_and_coverage_of_spheres_are_the_closed_form() {
+    let t = spheres();
+    let (n, m) = (t.angles as usize, t.densities as usize);
+    let (r, h) = (3.0, 5.0);
+    let area = PI * r * r;
+    for j in 0..m {
+        let x = tables::density_node(m, j, f64::from(t.max_thickness));
+        let (mut sum, mut weight, steps) = (0.0, 0.0, 2000);
+        for k in 0..steps {
+            let u = (f64::from(k) + 0.5) / f64::from(steps);
+            let below_top = r - r * (1.0 - u).sqrt();
+            let w = (-x * u).exp();
+            sum += w / (1.0 + below_top * below_top * x / area / 0.25);
+            weight += w;
+        }
+        let [_, leaf, bark, _] = tables::view(t, 0.0, x);
+        assert!((leaf + bark - sum / weight).abs() < 0.005, "E at {x}: {} {}", leaf + bark, sum / weight);
+        for i in 0..n {
+            let v = tables::zenith_node(n, i);
+            let [.., coverage] = tables::view(t, v, x);
+            let exact = 1.0 - (-x * (1.0 - overlap(r, h, v, 0.0, 0.0) / area)).exp();
+            // Known only as far as ground is seen.
+            let seen = tables::visible_ground(t, v, x);
+            assert!((coverage - exact).abs() * seen < 0.01, "coverage at {x}, {v}: {coverage} {exact}");
+        }
+    }
+}
+
 fn sound(t: &ForestTables) {
     let (n, m) = (t.angles as usize, t.densities as usize);
     assert_eq!((t.pair.len(), t.view.len(), t.ground.len()), (m * n * n * n, m * n, m));
@@ -290,7 +322,7 @@ fn everything_that_tables_depend_on_is_in_the_key() {
         ForestSettings { pattern_density: 0.031, ..TINY },
         ForestSettings { scale_range: [0.8, 1.3], ..TINY },
         ForestSettings { poisson: true, ..TINY },
-        ForestSettings { hole_radius: 0.5, ..TINY },
+        ForestSettings { hole_radius: 0.6, ..TINY },
         ForestSettings { light_iterations: 2, ..TINY },
         ForestSettings { view_iterations: 3, ..TINY },
     ] {
