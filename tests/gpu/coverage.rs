@@ -2,7 +2,7 @@
 
 use crate::device::{self, Worst};
 use crate::seeds::{SIZE, above, hills, plain, positions, seeds};
-use canopy::forest::quadtree::{QuadKey, Quadtree};
+use canopy::forest::quadtree::{MIN_REFINE, QuadKey, Quadtree};
 use canopy::frame::{FrameReport, Renderer};
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::{COVER_GUTTER, Seed, TERRAIN_CELLS, TerrainQuad};
@@ -323,6 +323,40 @@ fn a_parent_is_the_mean_of_its_children() {
         // which the product leaves more open than they do: it covers a little less.
         assert!(error < bound && bias.abs() < 0.6 * bound, "{error} {bias}");
     }
+    gpu.close().unwrap();
+}
+
+#[test]
+fn nothing_jumps_when_quads_split() {
+    let gpu = device::open();
+    // No tree is drawn, no sun shines: what is seen is the ground as coverage darkens it, at a metre a pixel.
+    let mut scene = plain(450.0, [0.02, 0.01]);
+    scene.settings.set("zfield_min_pixels", 64.0).unwrap();
+    let frame = |height: f64| {
+        let camera = Camera { vertical_fov: 30.0, ..from_height(&scene, height) };
+        let mut renderer = device::renderer(&gpu, &scene, &camera, [480, 480], true);
+        let report = renderer.render(&camera, 1.0).unwrap();
+        assert_eq!(report.trees.camera, 0);
+        (report.terrain_quads, renderer.picture().unwrap().linear.unwrap())
+    };
+    // Quads of 225 m split nearer than 3.5 sides.
+    let split = MIN_REFINE * 225.0;
+    let ((few, far), (many, near)) = (frame(split + 0.02), frame(split - 0.02));
+    assert!(few == 4 && many > 4, "{few} quads, then {many}");
+    let (mut worst, mut mean, mut spread) = (Worst::default(), 0.0, 0.0);
+    for (k, (a, b)) in far.sky.iter().zip(&near.sky).enumerate() {
+        let (a, b) = (f64::from(a[0]), f64::from(b[0]));
+        worst.note((a / b - 1.0).abs(), || format!("pixel {k}: {a} {b}"));
+        mean += a;
+        spread += a * a;
+    }
+    let n = far.sky.len() as f64;
+    let spread = (spread * n / (mean * mean) - 1.0).sqrt();
+    println!("brightness varies by about {spread:.3}");
+    assert!(spread > 0.1, "there is nothing to jump");
+    // Four centimetres of 787 m move the image's corner by 1/70 pixel, of five to a texel; contrast is at most one of
+    // its mean a texel. Half floats: a step of 2^-10 at each of two frames and twice between texels.
+    worst.within(1.0 / 70.0 / 5.0 * 2.0 + 4.0 / 1024.0, "change of brightness");
     gpu.close().unwrap();
 }
 
