@@ -267,9 +267,9 @@ fn coverage_and_densities_are_those_of_the_trees() {
                 continue;
             }
             let at = [low[0] + (k % size) as f64 * texel, low[1] + (k / size) as f64 * texel];
-            for species in 0..2 {
+            for (species, found) in found.iter_mut().enumerate() {
                 let trees = frame.tiles[key][0][k][1 + species] / frame.crowns[species][1] * texel * texel;
-                (0..2).for_each(|axis| found[species][axis][usize::from(at[axis] >= 225.0 - 1e-9)] += trees);
+                (0..2).for_each(|axis| found[axis][usize::from(at[axis] >= 225.0 - 1e-9)] += trees);
             }
         }
     }
