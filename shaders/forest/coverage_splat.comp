@@ -34,10 +34,8 @@ void draw_disc(vec3 disc, int side, uint first) {
     ivec2 high = min(ivec2(floor(disc.xy + reach - 0.5)), side - 1);
     for (int y = low.y; y <= high.y; y++) {
         for (int x = low.x; x <= high.x; x++) {
-            uint at = first + uint(y * side + x);
-            // Half the range is 4000 discs: dark enough, and far enough from wrapping around.
             uint sum = open_sum(disc_share(vec2(x, y) + 0.5 - disc.xy, disc.z));
-            if (sum > 0u && sums.items[at] < 0x80000000u) atomicAdd(sums.items[at], sum);
+            if (sum > 0u) atomicAdd(sums.items[first + uint(y * side + x)], sum);
         }
     }
 }

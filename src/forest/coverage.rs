@@ -33,8 +33,8 @@ const LEAST_RADIUS_PART: f64 = 0.1;
 /// Discs of a smaller part of a texel are not drawn (BN12, section 4).
 const LEAST_DISC: f64 = 1.0 / 16.0;
 /// Smallest radius of a mean disc on the grid on which discs are drawn, in cells of that grid: discs side by side share
-/// cells, in which the product of what each leaves open takes too much off, 2 % of discs of this radius.
-const LEAST_RADIUS: f64 = 1.0;
+/// cells, in which the product of what each leaves open takes too much off, 3 % of discs of this radius.
+const LEAST_RADIUS: f64 = 0.75;
 /// Most workgroups a dispatch.
 const MOST_GROUPS: u32 = 32768;
 /// Texels along a side of a workgroup's block.

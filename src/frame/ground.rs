@@ -9,8 +9,8 @@ use crate::forest::coverage;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::gpu::interface::{ForestNode, TERRAIN_CELLS, TERRAIN_HEIGHTS};
 use crate::gpu::{
-    Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler,
-    Targets, shaders, vk,
+    Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler, Targets,
+    shaders, vk,
 };
 use crate::plan::Plan;
 
@@ -49,7 +49,6 @@ impl Ground {
                 colors: &formats,
                 samples: plan.samples,
                 depth: DepthTest::Reverse,
-                blend: Blend::Replace,
                 constants: &[
                     (0, plan.cover_groups),
                     (1, (plan.coverage_size as f32).to_bits()),

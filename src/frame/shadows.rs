@@ -9,8 +9,8 @@ use crate::forest::species::SpeciesData;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand, TERRAIN_CELLS, TerrainParameters};
 use crate::gpu::{
-    Attachment, Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource,
-    Sampler, Targets, shaders, vk,
+    Attachment, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler,
+    Targets, shaders, vk,
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -57,7 +57,6 @@ impl Shadows {
                 colors: &[],
                 samples: 1,
                 depth: DepthTest::Reverse,
-                blend: Blend::Replace,
                 constants,
             })
         };

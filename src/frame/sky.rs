@@ -4,8 +4,8 @@ use super::targets::ImageTargets;
 use super::view::Light;
 use crate::Result;
 use crate::gpu::{
-    Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler,
-    Targets, shaders, vk,
+    Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler, Targets,
+    shaders, vk,
 };
 use crate::plan::Plan;
 use crate::scene::{Scene, Sky};
@@ -47,7 +47,6 @@ impl SkyPass {
             colors: &formats,
             samples: plan.samples,
             depth: DepthTest::None,
-            blend: Blend::Replace,
             constants: &[],
         })?;
         Ok(Some(SkyPass { image, program }))

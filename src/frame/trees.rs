@@ -5,8 +5,7 @@ use super::targets::ImageTargets;
 use crate::Result;
 use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand};
 use crate::gpu::{
-    Blend, Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets,
-    shaders,
+    Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets, shaders,
 };
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -34,7 +33,6 @@ impl Trees {
                 colors: &formats,
                 samples: plan.samples,
                 depth: DepthTest::Reverse,
-                blend: Blend::Replace,
                 constants: &[
                     (0, s.view_rings),
                     (1, (s.view_resolution as f32).to_bits()),

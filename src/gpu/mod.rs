@@ -19,7 +19,7 @@ mod transfer;
 pub use ash::vk;
 pub use context::{Gpu, GpuOptions};
 pub use memory::{Buffer, Image, ImageDesc};
-pub use program::{Blend, DepthTest, GraphicsDesc, Program, Sampler};
+pub use program::{DepthTest, GraphicsDesc, Program, Sampler};
 #[doc(hidden)]
 pub use record::Fault;
 pub use record::{Attachment, ComputePass, PassTime, Recorder, RenderPass, Resource, Targets, Work};

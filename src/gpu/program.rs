@@ -78,16 +78,7 @@ pub enum DepthTest {
     Reverse,
 }
 
-/// How colours combine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Blend {
-    /// The new value replaces the old.
-    Replace,
-    /// Union of coverages: s + d − s d.
-    Union,
-}
-
-/// A graphics pipeline; it draws triangles.
+/// A graphics pipeline; it draws triangles, whose colours replace what was there.
 #[derive(Clone, Copy, Debug)]
 pub struct GraphicsDesc<'a> {
     /// Vertex shader.
@@ -100,8 +91,6 @@ pub struct GraphicsDesc<'a> {
     pub samples: u32,
     /// Depth test; the depth buffer is D32.
     pub depth: DepthTest,
-    /// Blending, for every colour attachment.
-    pub blend: Blend,
     /// Specialization constants: (id, value).
     pub constants: &'a [(u32, u32)],
 }
@@ -161,13 +150,8 @@ impl Gpu {
             .depth_test_enable(depth_on)
             .depth_write_enable(depth_on)
             .depth_compare_op(vk::CompareOp::GREATER_OR_EQUAL);
-        let attachment = vk::PipelineColorBlendAttachmentState::default()
-            .color_write_mask(vk::ColorComponentFlags::RGBA)
-            .blend_enable(d.blend == Blend::Union)
-            .src_color_blend_factor(vk::BlendFactor::ONE)
-            .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_COLOR)
-            .src_alpha_blend_factor(vk::BlendFactor::ONE)
-            .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
+        let attachment =
+            vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
         let attachments = vec![attachment; d.colors.len()];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
         let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];

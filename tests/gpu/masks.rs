@@ -2,7 +2,7 @@
 
 use crate::device::{self, Arguments, Function, evaluate};
 use canopy::gpu::{
-    Attachment, Blend, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Resource, Targets, shaders, vk,
+    Attachment, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Resource, Targets, shaders, vk,
 };
 use canopy::physics::masks;
 
@@ -101,7 +101,6 @@ fn n_trees_of_opacity_alpha_cover_one_minus_one_minus_alpha_to_the_n() {
                 colors: &[vk::Format::R16G16B16A16_SFLOAT],
                 samples,
                 depth: DepthTest::None,
-                blend: Blend::Replace,
                 constants: &[(2, table.len() as u32), (3, samples)],
             })
             .unwrap();
