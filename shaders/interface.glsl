@@ -242,5 +242,5 @@ struct CoverageParameters {
 struct TonemapParameters {
     uvec2 size;                       // pixels
     float exposure;                   // factor before the curve
-    uint parts;                       // images whose sum is the radiance: 1 or 2
+    uint parts;                       // images whose sum is the radiance: 1 or 2; 0: one of colours to show as they are
 };

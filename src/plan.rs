@@ -62,6 +62,37 @@ impl Representation {
     }
 }
 
+/// What a picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ViewMode {
+    /// Radiance.
+    #[default]
+    Radiance,
+    /// Lit and shadowed ground, lit and shadowed trees.
+    Fractions,
+    /// Coverage of the ground by trees, from above.
+    Coverage,
+    /// What represents a tree, and the level of the coverage.
+    Lod,
+    /// Shadow cascades.
+    Cascades,
+    /// Normals of the ground.
+    Normals,
+}
+
+impl ViewMode {
+    /// All, with the names that users write.
+    pub const NAMES: [(&'static str, ViewMode); 6] = [
+        ("radiance", ViewMode::Radiance),
+        ("fractions", ViewMode::Fractions),
+        ("coverage", ViewMode::Coverage),
+        ("lod", ViewMode::Lod),
+        ("cascades", ViewMode::Cascades),
+        ("normals", ViewMode::Normals),
+    ];
+}
+
 /// One thing that the scene requires.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Item {
@@ -82,6 +113,8 @@ pub struct Plan {
     pub items: Vec<Item>,
     /// How trees are drawn.
     pub representation: Representation,
+    /// What the picture shows; [`Plan::new`] says radiance, and whoever wants another mode sets it before the renderer is made.
+    pub view_mode: ViewMode,
     /// Image size, pixels.
     pub size: [u32; 2],
     /// Samples a pixel.
@@ -164,6 +197,7 @@ impl Plan {
         let mut plan = Plan {
             items: Vec::new(),
             representation,
+            view_mode: ViewMode::Radiance,
             size: eye.size,
             samples: samples(s.samples, device),
             layers,

@@ -10,6 +10,7 @@ layout(constant_id = 0) const uint COVER_LAYERS = 0u; // layers a tile; 0: no tr
 layout(constant_id = 1) const float COVER_SIDE = 256.0;
 
 struct Cover {
+    float texel;                      // of the level of detail, in texels of mip 0
     float resolved;                   // 0 where discs are too small to tell
     vec4 channels[COVER_GROUPS];      // coverage as stored, then density times mean area of each species
 };
@@ -32,6 +33,7 @@ Cover cover() {
     for (uint g = 0u; g < COVER_LAYERS; g++) {
         c.channels[g] = textureLod(cover_tiles, vec3(cover_at.xy, float(cover_layer + g)), min(lod, 3.0));
     }
+    c.texel = exp2(lod);
     // Discs fade where their mean is 1/4 to 1/16 of a texel of this level, and where levels end.
     c.resolved = clamp(0.5 * (cover_disc + 4.0) - lod, 0.0, 1.0) * clamp(3.5 - lod, 0.0, 1.0);
     return c;

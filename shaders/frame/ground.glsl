@@ -5,10 +5,11 @@
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec2 slope_at;
 layout(location = 2) flat in uint layer;
-layout(location = 6) in vec4 tree_sun;
-layout(location = 7) in vec4 tree_sky;
-layout(location = 8) in vec4 paths;
-layout(location = 9) in vec2 vertical;
+// At the centroid: outside of a triangle, which a pixel's centre may be, they would be extrapolated.
+layout(location = 6) centroid in vec4 tree_sun;
+layout(location = 7) centroid in vec4 tree_sky;
+layout(location = 8) centroid in vec4 paths;
+layout(location = 9) centroid in vec2 vertical;
 
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 3) uniform sampler2DArray slope_tiles;
@@ -39,10 +40,12 @@ float shadow_maps(vec3 n, float cosine, float distance) {
     return sun_visibility(shadow_map, (view.v.cascade_from_world[c] * vec4(from, 1.0)).xyz, gradient, c);
 }
 
+// Unit normal of the ground.
+vec3 ground_normal() { return normalize(vec3(-textureLod(slope_tiles, vec3(slope_at, float(layer)), 0.0).rg, 1.0)); }
+
 // Ground and, where trees are not drawn one by one, the trees on it (BN12, eq. 11-13 and 24-27).
 GroundLight ground_light() {
-    vec2 slope = textureLod(slope_tiles, vec3(slope_at, float(layer)), 0.0).rg;
-    vec3 n = normalize(vec3(-slope, 1.0));
+    vec3 n = ground_normal();
     vec2 world = (vec2(view.v.grid_camera) * p.step + view.v.grid_offset + position.xy) / p.extent;
     vec3 reflectance = textureLod(albedo, vec3(world.x, 1.0 - world.y, 0.0), 0.0).rgb;
     float distance = length(position);

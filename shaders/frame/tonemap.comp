@@ -16,5 +16,7 @@ void main() {
     ivec3 at = ivec3(k % p.size.x, k / p.size.x, 0);
     vec3 c = texelFetch(radiance, at, 0).rgb;
     if (p.parts == 2u) c += texelFetch(second_part, at, 0).rgb;
-    picture.items[k] = packUnorm4x8(vec4(srgb(tone_curve(c * p.exposure)), 1.0));
+    // A view mode's colours are shown as they are.
+    if (p.parts > 0u) c = tone_curve(c * p.exposure);
+    picture.items[k] = packUnorm4x8(vec4(srgb(clamp(c, 0.0, 1.0)), 1.0));
 }

@@ -5,13 +5,15 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use canopy::bake::{Baked, cache, load_or_bake_scene};
+use canopy::frame::camera::Eye;
 use canopy::frame::{FrameReport, Renderer, auto_exposure};
 use canopy::gpu::{DeviceInfo, Gpu, GpuOptions, PassTime};
-use canopy::plan::Plan;
+use canopy::plan::{Plan, Representation, ViewMode};
 use canopy::progress::Progress;
 use canopy::scene::{Camera, Scene};
 use canopy::settings::Settings;
 use canopy::{Error, Result};
+use clap::builder::PossibleValuesParser;
 
 use super::SCHEMA_VERSION;
 use super::options::{PrintOptions, SceneOptions, knobs_help};
@@ -24,6 +26,7 @@ Examples:
   canopy render my.toml -o a.png --exr a.exr          your scene, and linear radiance in layers
   canopy render --size 320x240 --quality fast         small and quick
   canopy render --set samples=8 --set cascades=2      turn knobs; --help lists them all
+  canopy render --view-mode fractions -o k.png        lit and shadowed ground and trees
   canopy render --frames 5 --json > report.json       warm timings for a script";
 
 #[derive(clap::Args)]
@@ -34,9 +37,16 @@ pub struct Args {
     /// Picture to write; left out: NAME.png after the scene, or canopy.png
     #[arg(short, long, value_name = "FILE.png")]
     output: Option<PathBuf>,
-    /// Linear image to write, with layers radiance, sun, sky, depth, trees, species
+    /// Linear image to write, with layers radiance, sun, sky, depth, trees, species, fractions
     #[arg(long, value_name = "FILE.exr")]
     exr: Option<PathBuf>,
+    /// Draw what the renderer decides instead of light: fractions (lit and shadowed ground, lit and shadowed trees), coverage,
+    /// lod, cascades, normals
+    #[arg(long, value_name = "MODE", default_value = "radiance", value_parser = PossibleValuesParser::new(ViewMode::NAMES.map(|m| m.0)))]
+    view_mode: String,
+    /// How trees are drawn: auto, zfield or shader-map at any distance
+    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = PossibleValuesParser::new(Representation::NAMES.map(|m| m.0)))]
+    representation: String,
     /// Stops brighter (or, negative, darker) than the automatic exposure
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = stops)]
     exposure: f64,
@@ -139,6 +149,9 @@ struct Report<'a> {
 }
 
 pub fn run(args: &Args) -> Result<()> {
+    if args.exr.is_some() && args.view_mode != "radiance" {
+        return Err(Error::Usage("--exr holds radiance: leave out --view-mode".into()));
+    }
     if let Some(png) = &args.output {
         output::check(png, "png")?;
     }
@@ -175,7 +188,13 @@ fn stops(text: &str) -> std::result::Result<f64, String> {
 /// Everything between opening and closing the device.
 fn draw(args: &Args, gpu: &Gpu, scene: Scene, camera: &Camera, png: PathBuf, load_s: f64) -> Result<()> {
     let quiet = args.print.quiet;
-    let plan = Plan::new(&scene, camera, args.scene.size, args.exr.is_some(), Some(gpu.info()))?;
+    let named =
+        |all: &[(&str, Representation)]| all.iter().find(|(n, _)| *n == args.representation).map(|(_, r)| *r);
+    let representation = named(&Representation::NAMES).unwrap_or_default();
+    let eye = Eye::new(camera, &scene.terrain, args.scene.size);
+    let mut plan = Plan::for_eye(&scene, &eye, args.exr.is_some(), representation, Some(gpu.info()))?;
+    let mode = ViewMode::NAMES.iter().find(|(name, _)| *name == args.view_mode);
+    plan.view_mode = mode.map_or(ViewMode::Radiance, |(_, mode)| *mode);
     let scene = Arc::new(scene);
     let start = Instant::now();
     let (mut baked, mut states): (Vec<Baked>, Vec<Bake>) = (Vec::new(), Vec::new());

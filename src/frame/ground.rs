@@ -12,7 +12,7 @@ use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler, Targets,
     shaders, vk,
 };
-use crate::plan::Plan;
+use crate::plan::{Plan, ViewMode};
 
 /// Draws the ground.
 pub struct Ground {
@@ -41,10 +41,10 @@ impl Ground {
             indices: gpu.buffer_with("terrain indices", &indices)?,
             program: gpu.graphics(&GraphicsDesc {
                 vert: &shaders::FRAME_TERRAIN_VERT,
-                frag: if plan.layers {
-                    &shaders::FRAME_TERRAIN_LAYERS_FRAG
-                } else {
-                    &shaders::FRAME_TERRAIN_FRAG
+                frag: match plan.view_mode {
+                    ViewMode::Radiance if plan.layers => &shaders::FRAME_TERRAIN_LAYERS_FRAG,
+                    ViewMode::Radiance => &shaders::FRAME_TERRAIN_FRAG,
+                    _ => &shaders::FRAME_TERRAIN_MODE_FRAG,
                 },
                 colors: &formats,
                 samples: plan.samples,
@@ -53,6 +53,7 @@ impl Ground {
                     (0, plan.cover_groups),
                     (1, (plan.coverage_size as f32).to_bits()),
                     (5, u32::from(plan.cascades > 0)),
+                    (12, plan.view_mode as u32),
                 ],
             })?,
             no_coverage: gpu.image(&ImageDesc {

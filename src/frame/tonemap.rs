@@ -4,7 +4,7 @@ use super::targets::ImageTargets;
 use crate::Result;
 use crate::gpu::interface::TonemapParameters;
 use crate::gpu::{Gpu, Program, Recorder, Resource, Sampler, shaders};
-use crate::plan::Plan;
+use crate::plan::{Plan, ViewMode};
 
 /// Tone maps the resolved image.
 pub struct Tonemap {
@@ -18,7 +18,11 @@ impl Tonemap {
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
     pub fn new(gpu: &Gpu, plan: &Plan) -> Result<Self> {
-        let parts = if plan.layers { 2 } else { 1 };
+        let parts = match plan.view_mode {
+            ViewMode::Radiance if plan.layers => 2,
+            ViewMode::Radiance => 1,
+            _ => 0,
+        };
         Ok(Tonemap { program: gpu.compute(&shaders::FRAME_TONEMAP_COMP, &[])?, parts })
     }
 
@@ -26,7 +30,7 @@ impl Tonemap {
     pub fn record(&self, recorder: &mut Recorder, targets: &ImageTargets, plan: &Plan, exposure: f64) {
         let part = |k: usize| Resource::Texture(&targets.colors[k].image, Sampler::Nearest);
         recorder.compute("tone map", |pass| {
-            let (first, second) = (part(0), part(self.parts as usize - 1));
+            let (first, second) = (part(0), part(self.parts.saturating_sub(1) as usize));
             let picture = ("picture", Resource::Buffer(&targets.picture));
             pass.bind(&self.program, &[("radiance", first), ("second_part", second), picture]);
             pass.push(&TonemapParameters { size: plan.size, exposure: exposure as f32, parts: self.parts });

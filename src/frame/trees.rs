@@ -7,7 +7,7 @@ use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand};
 use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets, shaders,
 };
-use crate::plan::Plan;
+use crate::plan::{Plan, ViewMode};
 use crate::scene::Scene;
 
 /// Draws z-field trees.
@@ -29,7 +29,11 @@ impl Trees {
         let program = |estimates: u32, magnified: bool, converged: bool| {
             gpu.graphics(&GraphicsDesc {
                 vert: &shaders::FRAME_TREE_VERT,
-                frag: if plan.layers { &shaders::FRAME_TREE_LAYERS_FRAG } else { &shaders::FRAME_TREE_FRAG },
+                frag: match plan.view_mode {
+                    ViewMode::Radiance if plan.layers => &shaders::FRAME_TREE_LAYERS_FRAG,
+                    ViewMode::Radiance => &shaders::FRAME_TREE_FRAG,
+                    _ => &shaders::FRAME_TREE_MODE_FRAG,
+                },
                 colors: &formats,
                 samples: plan.samples,
                 depth: DepthTest::Reverse,
@@ -43,6 +47,7 @@ impl Trees {
                     (6, u32::from(plan.cascades > 0)),
                     (7, u32::from(magnified)),
                     (8, u32::from(converged)),
+                    (12, plan.view_mode as u32),
                 ],
             })
         };
