@@ -152,7 +152,6 @@ struct Tree {
     float own;                        // 1 - nu: weight of the tree's own light
     vec3 mean_sky;                    // average radiance from the sky, times nu
     float mean_lit;                   // average k_t / (k_t + k_t-bar), times nu
-    vec2 canopy;                      // change of depth along the axes of its cascade, of a plane parallel to the ground
 };
 
 // An indexed indirect draw.

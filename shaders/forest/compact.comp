@@ -8,7 +8,6 @@
 #include "physics/light.glsl"
 #include "physics/tables.glsl"
 #include "physics/handover.glsl"
-#include "physics/shadow.glsl"
 #include "forest/cull.glsl"
 #include "forest/members.glsl"
 
@@ -100,8 +99,6 @@ Tree make_tree(Seed s, vec3 centre, Species kind) {
     average_light(t, kind, to_camera, ground, density, converged(reach, v.convergence));
     uint cascade = 0u;
     for (uint c = 0u; c + 1u < v.cascade_count; c++) cascade += distance > v.cascade_far[c] ? 1u : 0u;
-    t.canopy = plane_gradient(ground, v.cascade_planes[3u * cascade].xyz, v.cascade_planes[3u * cascade + 1u].xyz,
-                              v.sun_direction);
     t.cascade = v.cascade_count == 0u || distance > v.cascade_far[v.cascade_count - 1u] ? MAX_CASCADES : cascade;
     return t;
 }

@@ -33,7 +33,6 @@ layout(location = 22) flat out float dither;
 layout(location = 23) flat out vec4 bark;       // relative colour; w: height under which there is only bark
 layout(location = 24) flat out vec4 mean_sun;   // average light, times nu; w: 1 - nu
 layout(location = 25) flat out vec4 mean_sky;   // w: average lit fraction, times nu
-layout(location = 26) flat out vec2 canopy;     // change of depth of the canopy along the axes of the cascade
 
 void main() {
     View v = view.v;
@@ -77,6 +76,10 @@ void main() {
     mat4 shadow = v.cascade_from_world[min(t.cascade, MAX_CASCADES - 1u)];
     shadow_p = (shadow * vec4(position, 1.0)).xyz;
     shadow_c = vec4(shadow[3].xyz, (shadow * vec4(v.sun_direction, 0.0)).z);
+    // A texel spans crowns whose backs slope by about one: half a texel towards the sun, or neighbours shade each other's rims.
+    float bias = 0.5 * v.cascade_texel[min(t.cascade, MAX_CASCADES - 1u)] * shadow_c.w;
+    shadow_p.z += bias;
+    shadow_c.z += bias;
     weights = vec4(t.view_weights, t.light_weights);
     optics = vec4(t.mip, kind.extinction / t.scale, t.fade, c.z);
     sun = vec4(t.sun, t.hole);
@@ -86,6 +89,5 @@ void main() {
     bark = vec4(kind.bark, kind.crown_base);
     mean_sun = vec4(t.mean_sun, t.own);
     mean_sky = vec4(t.mean_sky, t.mean_lit);
-    canopy = t.canopy;
     dither = unit(hash(t.identity ^ HASH_DITHER));
 }

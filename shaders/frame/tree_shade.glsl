@@ -20,7 +20,6 @@ layout(location = 22) flat in float dither;
 layout(location = 23) flat in vec4 bark;
 layout(location = 24) flat in vec4 mean_sun;
 layout(location = 25) flat in vec4 mean_sky;
-layout(location = 26) flat in vec2 canopy;
 
 layout(binding = 6) uniform sampler2DArray views;
 layout(binding = 7) uniform sampler2DArray shadow_map;
@@ -85,7 +84,7 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
         vec3 entry = mix(shadow_p, shadow_c.xyz, s);
         entry.z += metres * shadow_c.w;
         uint cascade = tree_bits.w & 15u;
-        float visible = sun_visibility(shadow_map, entry, canopy, min(cascade, 3u));
+        float visible = sun_visibility(shadow_map, entry, vec2(0.0), min(cascade, 3u));
         through *= cascade < 4u ? visible : 1.0;
         sun_part += sun.rgb * colour * through;
         lit += mean_sun.w * through;

@@ -9,8 +9,8 @@ vec2 plane_gradient(vec3 n, vec3 x, vec3 y, vec3 sun) {
 // Which of four casters leave the sun to points at the depths.
 vec4 caster_visibility(vec4 casters, vec4 depths) { return vec4(lessThanEqual(casters, depths)); }
 
-// Bilinear blend over the four texels around a position in [-1, 1]^2; lit outside. What is lit is a part of a plane, a canopy
-// or the ground, that casters are drawn at the texels' centres of: so the depth to compare with is the plane's there.
+// Bilinear blend over the four texels around a position in [-1, 1]^2; lit outside. Casters are drawn at the texels' centres:
+// the ground goes on to there with its gradient, so its depth to compare with is the plane's there. Crowns are round: 0.
 float sun_visibility(sampler2DArray map, vec3 at, vec2 gradient, uint cascade) {
     float side = float(textureSize(map, 0).x);
     vec2 t = (at.xy * 0.5 + 0.5) * side - 0.5;
