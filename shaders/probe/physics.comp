@@ -44,18 +44,17 @@ void main() {
         case 2u: r.a.xy = floatBitsToUint(vec2(angle_between(a.xyz, b.xyz), hotspot(a.xyz, b.xyz, c.x, c.y))); break;
         case 3u: r.a.xyz = floatBitsToUint(leaf_phase(a.xyz, b.xyz, vec3(c.x, a.w, c.z), vec3(c.y, b.w, c.w))); break;
         case 4u: r.a.x = floatBitsToUint(hole_occlusion(a.x, a.y)); break;
-        case 5u: r.a.x = floatBitsToUint(ground_visibility(a.x)); break;
-        case 6u: r.a.x = floatBitsToUint(ground_contrast(a.x, a.y, a.z)); break;
-        case 7u: r.a.x = covered_samples(a.x, a.y, i.a.z); break;
-        case 8u: r.a.x = mask_column(i.a.xyz, i.b.x, i.b.y); break;
-        case 9u: {
+        case 5u: r.a.x = floatBitsToUint(ground_contrast(a.x, a.y, a.z)); break;
+        case 6u: r.a.x = covered_samples(a.x, a.y, i.a.z); break;
+        case 7u: r.a.x = mask_column(i.a.xyz, i.b.x, i.b.y); break;
+        case 8u: {
             vec2 gradient = plane_gradient(a.xyz, b.xyz, c.xyz, vec3(a.w, b.w, c.w));
             r.a.xy = floatBitsToUint(gradient);
             break;
         }
-        case 10u: r.a.xyz = floatBitsToUint(tone_curve(a.xyz)); break;
-        case 11u: r.a.xyz = floatBitsToUint(srgb(a.xyz)); break;
-        case 12u: r.a.x = view_layer(int(i.a.x), int(i.a.y), int(i.a.z)); break;
+        case 9u: r.a.xyz = floatBitsToUint(tone_curve(a.xyz)); break;
+        case 10u: r.a.xyz = floatBitsToUint(srgb(a.xyz)); break;
+        case 11u: r.a.x = view_layer(int(i.a.x), int(i.a.y), int(i.a.z)); break;
     }
     results.items[k] = r;
 }
