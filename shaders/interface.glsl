@@ -43,6 +43,10 @@ struct View {
     float ground_contrast;            // a3 of BN12 eq. 10
     float convergence;                // distance over the range from which light is the average, BN12 eq. 22-25
     float hole_radius;                // radius of the hole around a tree times sqrt(density), BN12 eq. 9
+    float silhouette_reach;           // range of trees on silhouettes over that of others: 1 without relief
+    float silhouette_step;            // first distance from a tree at which its sight line is compared with the ground, m
+    float height_cell;                // metres a texel of the height map
+    float cells_per_metre;            // 1 / height_cell
 };
 
 // One species. Bound as a uniform block: without arrays, and with a vec3 in it, std140 and std430 agree.

@@ -18,6 +18,8 @@ use crate::{Error, Result};
 const PATTERN_POINTS: u32 = 256;
 /// Seed quads along the range, at most.
 const QUADS_IN_RANGE: f64 = 24.0;
+/// Quads with trees on silhouettes along the distance beyond the range, at most.
+const SILHOUETTE_QUADS: f64 = 8.0;
 /// Side that no quad of the finest level of a plain with trees exceeds, m: their coverage tiles get fine near the camera.
 const PLAIN_SIDE: f64 = 160.0;
 /// Coverage tiles for a view whose terrain is as coarse as it may be: about thirty quads a level, eight levels.
@@ -130,6 +132,8 @@ pub struct Plan {
     pub species_range: Vec<f64>,
     /// The largest of these, m; 0 without trees.
     pub range: f64,
+    /// Range of trees on silhouettes of the ground over that of others (1: no such trees).
+    pub silhouette_reach: f64,
     /// Distances under which texels of some tree are magnified, from which every tree covers only a few pixels, and from
     /// which its light has converged to the average, m, ascending: the search for its surface needs filtered estimates, or
     /// none, and then no light ray or shadow either.
@@ -146,6 +150,9 @@ pub struct Plan {
     pub pattern_density: f64,
     /// Regions of the seed buffer.
     pub seed_regions: u32,
+    /// Of these, how many there are for quads beyond the range with trees on silhouettes. Where there are more in view, the
+    /// farthest go without such trees.
+    pub silhouette_quads: u32,
     /// Seeds a region.
     pub region_capacity: u32,
     /// Trees drawn one by one, at most.
@@ -206,6 +213,7 @@ impl Plan {
             shadow_distance: 0.0,
             species_range: Vec::new(),
             range: 0.0,
+            silhouette_reach: 1.0,
             draw_limits: [0.0; 3],
             tallest: 0.0,
             quad_side: 1.0,
@@ -213,6 +221,7 @@ impl Plan {
             tiles_per_quad: 1,
             pattern_density: 0.0,
             seed_regions: 1,
+            silhouette_quads: 0,
             region_capacity: gpu::CULL_GROUP,
             tree_capacity: 1,
             terrain_tiles: if scene.terrain.heights.is_some() { 1024 } else { 1 },
@@ -252,6 +261,11 @@ impl Plan {
         self.items.iter().map(|i| i.bytes).sum()
     }
 
+    /// Distance to which any tree is drawn, m: those on silhouettes go on beyond the range.
+    pub fn last_range(&self) -> f64 {
+        self.range * self.silhouette_reach
+    }
+
     /// Trees: how far, in which quads, in how much memory.
     fn trees(&mut self, scene: &Scene, eye: &Eye, device: Option<&DeviceInfo>) {
         let s = &scene.settings;
@@ -286,11 +300,17 @@ impl Plan {
             self.range = 0.0;
             return;
         }
+        // Level ground has no silhouettes. A shader-map at any distance, and trees at any distance, leave them as they are.
+        if scene.terrain.heights.is_some() && self.representation == Representation::Auto {
+            let ratio = f64::from(s.zfield_min_pixels) / f64::from(s.silhouette_min_pixels);
+            self.silhouette_reach = ratio.max(1.0);
+        }
         // Trees are no farther than the terrain, seen from here or from anywhere on it.
         let extent = scene.terrain.extent;
         let farthest = [0, 1].map(|k| eye.position[k].abs().max((eye.position[k] - extent[k]).abs()));
         let farthest = farthest[0].hypot(farthest[1]).hypot(eye.position[2]);
-        let reach = self.range.min(farthest.max(extent[0].hypot(extent[1])));
+        let farthest = farthest.max(extent[0].hypot(extent[1]));
+        let reach = self.range.min(farthest);
         if self.pattern_density > 0.0 {
             let pattern = Pattern::new(PATTERN_POINTS, scene.seed);
             self.tile_side = (pattern.mean_points() / self.pattern_density).sqrt();
@@ -316,8 +336,19 @@ impl Plan {
         };
         let region_bytes = u64::from(self.region_capacity) * size_of::<gpu::Seed>() as u64;
         let most = (storage / region_bytes).max(1);
-        self.seed_regions = (across(0) * across(1)).min(most as f64) as u32;
-        let slots = u64::from(self.seed_regions) * u64::from(self.region_capacity);
+        let near = (across(0) * across(1)).min(most as f64);
+        // Silhouettes beyond are lines: a few quads wide at any distance, however many quads there are.
+        let lines = if self.silhouette_reach > 1.0 {
+            SILHOUETTE_QUADS * (self.last_range().min(farthest) - reach) / self.quad_side
+        } else {
+            0.0
+        };
+        let exist = [0, 1].map(|k| (extent[k] / self.quad_side).ceil().max(1.0));
+        self.silhouette_quads = lines.min(exist[0] * exist[1] - near).min(most as f64 - near).max(0.0) as u32;
+        self.seed_regions = near as u32 + self.silhouette_quads;
+        // Few trees of such a quad stand on the line.
+        let slots =
+            (near as u64 + u64::from(self.silhouette_quads.div_ceil(4))) * u64::from(self.region_capacity);
         self.tree_capacity =
             u64::from(s.zfield_max_trees).min(slots).min(storage / size_of::<gpu::Tree>() as u64).max(1)
                 as u32;
@@ -406,12 +437,13 @@ impl Plan {
                 add("data", "point pattern", reason, 16 * 8 * u64::from(PATTERN_POINTS));
             }
             let slots = u64::from(self.seed_regions) * u64::from(self.region_capacity);
-            add(
-                "cache",
-                "seeds",
-                format!("{} quads of {:.0} m within {:.0} m", self.seed_regions, self.quad_side, self.range),
-                slots * size_of::<gpu::Seed>() as u64,
-            );
+            let near = self.seed_regions - self.silhouette_quads;
+            let mut reason = format!("{near} quads of {:.0} m within {:.0} m", self.quad_side, self.range);
+            if self.silhouette_quads > 0 {
+                let far = self.last_range();
+                reason += &format!(", {} with silhouettes to {far:.0} m", self.silhouette_quads);
+            }
+            add("cache", "seeds", reason, slots * size_of::<gpu::Seed>() as u64);
             add(
                 "cache",
                 "coverage tiles",

@@ -65,6 +65,7 @@ knobs! {
     samples: u32, "", 1..=8, [4, 4, 8], "samples a pixel (1, 4 or 8, as far as the device goes): levels of opacity; fill cost";
     zfield_min_pixels: f32, "px", 0.25..=64.0, [4.0, 3.0, 2.0], "apparent tree height under which trees are no longer drawn one by one; cost grows with its inverse square";
     convergence: f32, "", 0.1..=0.8, [0.4, 0.45, 0.6], "part of the tree-by-tree range at which light and shadow have become the averages of the tables (BN12, eq. 22-25: 0.8); cost of shadows grows with the square";
+    silhouette_min_pixels: f32, "px", 0.25..=64.0, [1.0, 1.0, 1.0], "apparent height under which trees on the silhouettes of ridges are no longer drawn either; from zfield_min_pixels on they are as others";
     zfield_max_trees: u32, "", 1..=16000000, [1000000, 2000000, 4000000], "most trees drawn one by one; bounds memory";
     cascades: u32, "", 1..=4, [3, 4, 4], "shadow cascades; each draws the trees of its slice again";
     cascade_size: u32, "texels", 64..=8192, [512, 1024, 2048], "texels a side of a cascade; fill cost";

@@ -29,6 +29,7 @@ layout(constant_id = 2) const float TABLE_ANGLES = 16.0;
 layout(constant_id = 3) const float TABLE_DENSITIES = 8.0;
 layout(binding = 10) uniform sampler3D pair_table;
 layout(binding = 11) uniform sampler2DArray view_table;
+layout(binding = 12) uniform sampler2DArray heights;
 
 uint rank_in(uint list, uint thread) {
     uint rank = 0u, word = thread >> 5u;
@@ -59,7 +60,15 @@ void average_light(inout Tree t, Species kind, vec3 to_camera, vec3 ground, floa
     t.mean_sky = nu * t.sky * (sky.y + sky.z * kind.bark);
 }
 
-Tree make_tree(Seed s, vec3 centre, Species kind) {
+// Opacity factor of a tree: faded out at its range, or on a silhouette, at the farther one.
+float range_fade(SeedQuad q, Seed s, vec3 centre, Species kind, float reach) {
+    float u = unit(hash(s.identity ^ HASH_FADE)), near = tree_fade(reach, u), height = tree_height(kind, s.scale);
+    bool asked = near < 1.0 && view.v.silhouette_reach > 1.0;
+    float clearance = silhouette(view.v, q, s, centre, height, heights, asked);
+    return max(near, silhouette_opacity(clearance, height) * tree_fade(reach / view.v.silhouette_reach, u));
+}
+
+Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     View v = view.v;
     Tree t;
     t.centre = centre;
@@ -86,7 +95,7 @@ Tree make_tree(Seed s, vec3 centre, Species kind) {
     float reach = distance / kind.range;
     vec3 eye = (back * -centre) / (kind.scale_to_metres * s.scale);
     float inside = max(length(eye.xy), abs(eye.z));
-    t.fade = tree_fade(reach, unit(hash(s.identity ^ HASH_FADE))) * smoothstep(1.05, 1.35, inside);
+    t.fade = range_fade(q, s, centre, kind, reach) * smoothstep(1.05, 1.35, inside);
     vec3 ground = normalize(vec3(-unpackHalf2x16(s.slope), 1.0));
     float density = unpackHalf2x16(s.species_density).y;
     density *= density;
@@ -114,7 +123,7 @@ void main() {
     Seed s = seeds.items[q.region * p.region_capacity + (group % p.groups_per_region) * CULL_GROUP + thread];
     Species kind = species.items[s.species_density & 0xffffu];
     uint index = counts.items[group] + rank_in(0u, thread);
-    trees.items[index] = make_tree(s, tree_centre(view.v, q, s, kind), kind);
+    trees.items[index] = make_tree(q, s, tree_centre(view.v, q, s, kind), kind);
     if ((seen & CLASS_CAMERA) != 0u) {
         uint list = 1u + (seen & 31u);
         lists.items[starts.items[list] + counts.items[list * p.group_count + group] + rank_in(list, thread)] = index;

@@ -3,6 +3,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
+#include "physics/hash.glsl"
 #include "forest/cull.glsl"
 #include "forest/members.glsl"
 
@@ -14,6 +15,7 @@ layout(std430, binding = 3) readonly buffer Seeds { Seed items[]; } seeds;
 layout(std140, binding = 4) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
 layout(std430, binding = 5) writeonly buffer Classes { uint items[]; } classes;
 layout(std430, binding = 6) writeonly buffer Counts { uint items[]; } counts;
+layout(binding = 7) uniform sampler2DArray heights;
 layout(push_constant) uniform Push { CullParameters p; };
 
 void main() {
@@ -25,7 +27,7 @@ void main() {
     if (slot < draws.items[q.region].index_count / 6u) {
         Seed s = seeds.items[q.region * p.region_capacity + slot];
         Species kind = species.items[s.species_density & 0xffffu];
-        seen = classify(view.v, kind, tree_centre(view.v, q, s, kind), s.scale);
+        seen = classify(view.v, q, s, kind, tree_centre(view.v, q, s, kind), heights);
     }
     classes.items[gl_WorkGroupID.x * CULL_GROUP + thread] = seen;
     enlist(seen, thread);

@@ -1,4 +1,7 @@
 // The decision of the cull. `precise` and a fixed order of operations let src/forest/cull.rs agree to the bit.
+// Needs physics/hash.glsl.
+
+#include "forest/silhouette.glsl"
 
 const uint CLASS_CAMERA = 1u << 5u;   // low five bits: distance bin
 const uint CLASS_CASCADE = 1u << 8u;  // and three more for the other cascades
@@ -17,25 +20,35 @@ float precise_dot(vec3 a, vec3 b) {
     return d;
 }
 
+// From the base to the top of the box, m.
+float tree_height(Species kind, float scale) {
+    precise float height = (2.0 * kind.scale_to_metres.z) * scale;
+    return height;
+}
+
 // 0 if no one sees it.
-uint classify(View v, Species kind, vec3 centre, float scale) {
-    precise float radius = kind.bounding_radius * scale;
+uint classify(View v, SeedQuad q, Seed s, Species kind, vec3 centre, sampler2DArray heights) {
+    precise float radius = kind.bounding_radius * s.scale;
     precise float d2 = precise_dot(centre, centre);
-    precise float range2 = kind.range * kind.range;
-    if (d2 > range2) return 0u;
+    // Where this tree has faded out (tree_fade): among others, and on a silhouette.
+    precise float end = kind.range * (0.9 + 0.1 * unit(hash(s.identity ^ HASH_FADE)));
+    precise float last = end * v.silhouette_reach;
+    if (d2 >= last * last) return 0u;
+    bool beyond = d2 >= end * end;
     uint seen = 0u;
     bool inside = true;
     for (int k = 0; k < 6; k++) {
         precise float d = precise_dot(v.planes[k].xyz, centre) + v.planes[k].w;
         inside = inside && d >= -radius;
     }
-    if (inside) {
+    if (silhouette(v, q, s, centre, tree_height(kind, s.scale), heights, inside && beyond) > 0.0 || (inside && !beyond)) {
         uint bin = 0u;
         for (uint k = 0u; k < DISTANCE_BINS - 1u; k++) bin += d2 > v.bins[k >> 2u][k & 3u] ? 1u : 0u;
         seen = CLASS_CAMERA | bin;
     }
+    // Shadows end before the range.
     for (uint c = 0u; c < v.cascade_count; c++) {
-        bool casts = true;
+        bool casts = !beyond;
         for (uint k = 0u; k < 2u; k++) {
             precise float d = precise_dot(v.cascade_planes[3u * c + k].xyz, centre) + v.cascade_centres[c][k];
             casts = casts && abs(d) <= v.cascade_planes[3u * c + k].w + radius;

@@ -5,15 +5,18 @@
 //! memory decide any order, so the same seeds give the same bits. [`classify`] is the CPU's twin of the decision.
 
 use super::seeds::SeedData;
+use super::silhouette::clearance;
 use super::species::SpeciesData;
 use super::tables::TableData;
+use super::terrain::TerrainData;
 use crate::gpu::interface::{
     CAMERA_DRAWS, CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, MAX_CASCADES, Seed, SeedQuad,
     Species, TREE_LISTS, Tree, View,
 };
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
+use crate::physics::hash::{HASH_FADE, hash, unit};
 use crate::plan::Plan;
-use crate::scene::Scene;
+use crate::scene::{Raster, Scene};
 use crate::{Error, Result};
 
 const _: () = assert!(TREE_LISTS == 1 + DISTANCE_BINS + MAX_CASCADES);
@@ -42,7 +45,7 @@ pub struct CullData {
     /// Distances under which a tree's texels may be magnified, from which it covers few pixels, and from which its light
     /// is the average, m.
     draw_limits: [f64; 3],
-    range: f64,
+    last: f64,
 }
 
 /// How many trees a frame draws.
@@ -91,7 +94,7 @@ impl CullData {
             ],
             capacity: plan.tree_capacity,
             draw_limits: plan.draw_limits,
-            range: plan.range,
+            last: plan.last_range(),
         })
     }
 
@@ -103,6 +106,7 @@ impl CullData {
         seeds: &SeedData,
         species: &SpeciesData,
         tables: &TableData,
+        terrain: &TerrainData,
     ) {
         let groups_per_region = seeds.region_capacity / CULL_GROUP;
         let parameters = CullParameters {
@@ -110,9 +114,9 @@ impl CullData {
             groups_per_region,
             region_capacity: seeds.region_capacity,
             tree_capacity: self.capacity,
-            near_bins: first_bin_from(self.draw_limits[0], self.range),
-            far_bins: first_bin_from(self.draw_limits[1], self.range),
-            converged_bins: first_bin_from(self.draw_limits[2], self.range),
+            near_bins: first_bin_from(self.draw_limits[0], self.last),
+            far_bins: first_bin_from(self.draw_limits[1], self.last),
+            converged_bins: first_bin_from(self.draw_limits[2], self.last),
         };
         let shared = [
             ("view", Resource::Buffer(view)),
@@ -129,6 +133,7 @@ impl CullData {
             ("lists", Resource::Buffer(&self.lists)),
             ("pair_table", Resource::Texture(&tables.pairs, Sampler::Linear)),
             ("view_table", Resource::Texture(&tables.views, Sampler::Linear)),
+            ("heights", Resource::Texture(&terrain.heights, Sampler::Nearest)),
         ];
         let groups = [parameters.group_count, 1, 1];
         for (name, program, size) in [
@@ -166,15 +171,15 @@ impl CullData {
     }
 }
 
-/// Distance to which a bin reaches, m: bins of equal ratio, because what matters for drawing front to back is relative
-/// distance. The last one has no end.
-pub fn bin_end(bin: u32, range: f64) -> f64 {
-    range.max(2.0).powf(f64::from(bin + 1) / f64::from(DISTANCE_BINS))
+/// Distance to which a bin reaches, m, of those up to the distance `last`: bins of equal ratio, because what matters for
+/// drawing front to back is relative distance. The last one has no end.
+pub fn bin_end(bin: u32, last: f64) -> f64 {
+    last.max(2.0).powf(f64::from(bin + 1) / f64::from(DISTANCE_BINS))
 }
 
 /// The first bin all of whose trees are at least this far.
-fn first_bin_from(distance: f64, range: f64) -> u32 {
-    (0..DISTANCE_BINS).find(|b| *b > 0 && bin_end(b - 1, range) >= distance).unwrap_or(DISTANCE_BINS)
+fn first_bin_from(distance: f64, last: f64) -> u32 {
+    (0..DISTANCE_BINS).find(|b| *b > 0 && bin_end(b - 1, last) >= distance).unwrap_or(DISTANCE_BINS)
 }
 
 /// Centre of a tree's box from the camera; twin of `tree_centre` in `shaders/forest/cull.glsl`, to the bit.
@@ -183,16 +188,29 @@ pub fn tree_centre(view: &View, quad: &SeedQuad, seed: &Seed, species: &Species)
     [xy[0], xy[1], (seed.ground - view.camera_height) + species.centre * seed.scale]
 }
 
-/// Class of a seed, 0 if no one sees it; twin of `classify` in `shaders/forest/cull.glsl`, to the bit.
-pub fn classify(view: &View, species: &Species, centre: [f32; 3], scale: f32) -> u32 {
+/// Class of a seed, 0 if no one sees it; twin of `classify` in `shaders/forest/cull.glsl`, to the bit. `heights` is the
+/// terrain's height map.
+pub fn classify(
+    view: &View,
+    quad: &SeedQuad,
+    seed: &Seed,
+    species: &Species,
+    centre: [f32; 3],
+    heights: Option<&Raster>,
+) -> u32 {
     let dot = |a: &[f32]| (a[0] * centre[0] + a[1] * centre[1]) + a[2] * centre[2];
-    let radius = species.bounding_radius * scale;
+    let radius = species.bounding_radius * seed.scale;
     let d2 = dot(&centre);
-    if d2 > species.range * species.range {
+    let end = species.range * (0.9 + 0.1 * unit(hash(seed.identity ^ HASH_FADE)));
+    let last = end * view.silhouette_reach;
+    if d2 >= last * last {
         return 0;
     }
+    let beyond = d2 >= end * end;
+    let height = (2.0 * species.scale_to_metres[2]) * seed.scale;
+    let stays = || heights.is_some_and(|h| clearance(view, quad, seed, centre, height, h) > 0.0);
     let mut seen = 0;
-    if view.planes.iter().all(|p| dot(&p[..3]) + p[3] >= -radius) {
+    if view.planes.iter().all(|p| dot(&p[..3]) + p[3] >= -radius) && (!beyond || stays()) {
         let bins = (0..DISTANCE_BINS as usize - 1).filter(|k| d2 > view.bins[k / 4][k % 4]).count();
         seen = CLASS_CAMERA | bins as u32;
     }
@@ -201,7 +219,7 @@ pub fn classify(view: &View, species: &Species, centre: [f32; 3], scale: f32) ->
         let along = |k: usize| dot(&plane(k)[..3]) + view.cascade_centres[c][k];
         let casts =
             (0..2).all(|k| along(k).abs() <= plane(k)[3] + radius) && along(2) >= -(plane(2)[3] + radius);
-        if casts {
+        if casts && !beyond {
             seen |= CLASS_CASCADE << c;
         }
     }

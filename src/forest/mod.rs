@@ -9,6 +9,7 @@ pub mod listed;
 pub mod pattern;
 pub mod quadtree;
 pub mod seeds;
+pub mod silhouette;
 pub mod species;
 pub mod tables;
 pub mod terrain;

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::cache::SlotCache;
 use super::quadtree::{Bounds, Quadtree};
+use super::silhouette::{Ground, silhouette_quads};
 use super::species::{SpeciesData, density_map_size};
 use super::terrain::TerrainData;
 use crate::frame::camera::Eye;
@@ -117,15 +118,21 @@ impl SeedData {
     pub fn update(
         &mut self,
         gpu: &Gpu,
+        scene: &Scene,
+        plan: &Plan,
         tree: &Quadtree,
         eye: &Eye,
-        range: f64,
         reach: [f64; 3],
     ) -> Result<SeedWork> {
         self.cache.begin_frame();
         self.visible = 0;
         self.visible_quads.clear();
-        let visible = if range > 0.0 { self.select(tree, eye, range, reach) } else { Vec::new() };
+        let mut visible =
+            if plan.range > 0.0 { self.select(tree, eye, plan.range, reach) } else { Vec::new() };
+        if let Some(heights) = scene.terrain.heights.as_ref().filter(|_| plan.silhouette_reach > 1.0) {
+            let ground = Ground { heights, terrain: &scene.terrain };
+            self.add_silhouettes(&ground, plan, tree, eye, &mut visible);
+        }
         let mut fresh = Vec::new();
         for quad in &visible {
             let slot = self.cache.slot(*quad).ok_or_else(|| {
@@ -160,14 +167,8 @@ impl SeedData {
         let mut found = Vec::new();
         for y in span(1) {
             for x in span(0) {
-                let low = [f64::from(x) * side, f64::from(y) * side];
-                let ground = tree.ground_bounds(low, [low[0] + side, low[1] + side]);
-                // Crowns reach out of their quad, and up; shadows reach away from the sun.
-                let margin = self.top;
-                let tall = Bounds {
-                    low: [ground.low[0] - margin, ground.low[1] - margin, ground.low[2]],
-                    high: [ground.high[0] + margin, ground.high[1] + margin, ground.high[2] + self.top],
-                };
+                // Shadows reach away from the sun.
+                let tall = self.tree_bounds(tree, (x, y));
                 let swept = Bounds {
                     low: [0, 1, 2].map(|k| tall.low[k] + reach[k].min(0.0)),
                     high: [0, 1, 2].map(|k| tall.high[k] + reach[k].max(0.0)),
@@ -179,6 +180,39 @@ impl SeedData {
         }
         found.sort_unstable_by_key(|(x, y)| (*y, *x));
         found
+    }
+
+    /// Bounds of a quad's trees: crowns reach out of their quad, and up.
+    fn tree_bounds(&self, tree: &Quadtree, (x, y): (i32, i32)) -> Bounds {
+        let low = [x, y].map(|v| f64::from(v) * self.side);
+        let ground = tree.ground_bounds(low, low.map(|l| l + self.side));
+        let margin = self.top;
+        Bounds {
+            low: [ground.low[0] - margin, ground.low[1] - margin, ground.low[2]],
+            high: [ground.high[0] + margin, ground.high[1] + margin, ground.high[2] + margin],
+        }
+    }
+
+    /// Adds the quads beyond the range whose trees may stand on silhouettes, as many as there are regions for, nearest first.
+    fn add_silhouettes(
+        &self,
+        ground: &Ground,
+        plan: &Plan,
+        tree: &Quadtree,
+        eye: &Eye,
+        visible: &mut Vec<(i32, i32)>,
+    ) {
+        let planes = eye.planes();
+        let mut beyond: Vec<(f64, (i32, i32))> = silhouette_quads(ground, eye, plan)
+            .into_iter()
+            .map(|quad| (self.tree_bounds(tree, quad), quad))
+            .filter(|(bounds, quad)| bounds.touches(&planes, eye.position) && !visible.contains(quad))
+            .map(|(bounds, quad)| (bounds.distance(eye.position), quad))
+            .collect();
+        beyond.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let room = (self.cache.capacity() as usize).saturating_sub(visible.len());
+        visible.extend(beyond.into_iter().take(room).map(|(_, quad)| quad));
+        visible.sort_unstable_by_key(|(x, y)| (*y, *x));
     }
 
     /// South-west corner of a quad from the camera's quad, m.

@@ -171,7 +171,7 @@ impl Renderer {
         let mut work = None;
         if let Some(forest) = &mut self.forest {
             let reach = shadow_reach(sun, plan.cascades, plan.tallest + 0.25 * (highest - lowest));
-            let fresh = forest.seeds.update(gpu, &self.terrain.tree, eye, plan.range, reach)?;
+            let fresh = forest.seeds.update(gpu, scene, plan, &self.terrain.tree, eye, reach)?;
             work = Some((fresh, forest.coverage.update(gpu, &self.terrain.tree, &forest.seeds, &mut draws)?));
         }
         self.terrain.upload(gpu, &draws)?;
@@ -185,7 +185,8 @@ impl Renderer {
         if let (Some(forest), Some((fresh, tiles))) = (&self.forest, &work) {
             forest.seeds.produce(&mut recorder, fresh, &self.terrain, &forest.species);
             forest.coverage.produce(&mut recorder, tiles, &forest.seeds, &self.terrain, &forest.species);
-            forest.cull.record(&mut recorder, &self.view, &forest.seeds, &forest.species, &forest.tables);
+            let Forest { seeds, species, tables, .. } = forest;
+            forest.cull.record(&mut recorder, &self.view, seeds, species, tables, &self.terrain);
         }
         let trees = self.forest.as_ref().map(|f| (&f.cull, &f.seeds, &f.species));
         let ground = (&self.terrain, &draws);

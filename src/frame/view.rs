@@ -96,7 +96,7 @@ pub fn view(
         view.cascade_far[c] = cascade.far as f32;
     }
     for k in 0..DISTANCE_BINS as usize {
-        let d = bin_end(k as u32, plan.range);
+        let d = bin_end(k as u32, plan.last_range());
         view.bins[k / 4][k % 4] = (d * d) as f32;
     }
     let split = |p: [f64; 2], side: f64| {
@@ -121,6 +121,10 @@ pub fn view(
     view.ground_contrast = s.ground_contrast;
     view.hole_radius = s.hole_radius;
     view.convergence = s.convergence;
+    view.silhouette_reach = plan.silhouette_reach as f32;
+    view.silhouette_step = plan.tallest as f32;
+    view.height_cell = scene.terrain.cell_size as f32;
+    view.cells_per_metre = (1.0 / scene.terrain.cell_size) as f32;
     view.range = plan.range.max(1.0) as f32;
     view
 }

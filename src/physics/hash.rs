@@ -17,6 +17,9 @@ pub fn unit(h: u32) -> f32 {
     (h >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
+/// Purpose of a tree's random number: when it fades.
+pub const HASH_FADE: u32 = 0x846c_a68b;
+
 /// A stream of hashes, for patterns made on the CPU.
 #[derive(Clone, Debug)]
 pub struct Stream {
