@@ -36,6 +36,9 @@ pub enum Function {
     ToneCurve,
     Srgb,
     ViewLayer,
+    Handover,
+    TableAngles,
+    TableCoordinates,
 }
 
 /// The outcomes of a function for many arguments.
