@@ -23,7 +23,7 @@
 //!
 //! # Where things are
 //!
-//! Data flows one way: [`scene`] → [`plan`] → [`bake`] → [`forest`] → [`frame`] → [`image`]. [`physics`] holds the
+//! Data flows one way: [`scene`] → [`plan`] → [`bake`] → [`forest`] → [`frame`] → [`image`] → [`measure`]. [`physics`] holds the
 //! models in double precision and knows nobody: it is what the shaders are tested against. [`gpu`] holds all Vulkan and
 //! all `unsafe`, and knows no forest.
 //!
@@ -35,7 +35,11 @@
 //! | BN12 §5, views of a z-field | [`bake`], [`physics::views`] | `physics/views.glsl` | `tests/views.rs`, `tests/bake.rs`, `tests/gpu/views.rs` |
 //! | BN12 §5, surface along a ray | [`physics::zfield`] | `physics/zfield.glsl` | `tests/zfield.rs`, `tests/zfield_quality.rs`, `tests/gpu/zfield.rs` |
 //! | BN12 eq. 7–12, light | [`physics::light`] | `physics/light.glsl`, `frame/tree_shade.glsl`, `frame/ground.glsl` | `tests/gpu/light.rs`, `tests/gpu/light_on_ground.rs` |
-//! | BN12 §6, tables G, T, D, E of far forests | [`bake::tables`], [`physics::tables`] | | `tests/tables.rs` |
+//! | BN12 §6, tables G, T, D, E of far forests | [`bake::tables`], [`forest::tables`], [`physics::tables`] | `physics/tables.glsl` | `tests/tables.rs`, `tests/gpu/tables.rs` |
+//! | BN12 §6, eq. 13–21, shader-map | [`frame::shader_map`] | `frame/shader_map.*`, `frame/ground.glsl` | `tests/gpu/shader_map.rs` |
+//! | BN12 §7, eq. 22–27, hand-over | [`physics::handover`] | `physics/handover.glsl` | `tests/gpu/tables.rs`, `tests/proofs/` |
+//! | silhouettes beyond the hand-over | [`forest::silhouette`] | `forest/silhouette.glsl` | `tests/gpu/silhouettes.rs` |
+//! | BN12 §9, figures 7 and 8 | [`measure::reflectance`] | | `tests/proofs/scale.rs`, `tests/cli.rs` |
 //! | BN12 §8, culling in order | [`forest::cull`] | `forest/cull.comp`, `forest/scan.comp`, `forest/compact.comp` | `tests/gpu/cull.rs` |
 //! | BN12 §8, sub-pixel masks | [`physics::masks`] | `physics/masks.glsl` | `tests/gpu/masks.rs` |
 //! | parallel-split shadow maps (Zhang et al. 2006) | [`frame::cascades`], [`frame::shadows`] | `frame/tree_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
