@@ -6,6 +6,7 @@ use crate::forest::quadtree::{MIN_REFINE, quad_count};
 use crate::forest::seeds::fullest_listed;
 use crate::forest::species::density_map_size;
 use crate::frame::camera::Eye;
+use crate::frame::shader_map;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
 use crate::physics::light::sun_disc_fraction;
@@ -379,6 +380,16 @@ impl Plan {
                 let reason = format!("species \"{}\" is drawn tree by tree", species.name);
                 add("data", &format!("z-field views of {}", species.name), reason, views);
             }
+            let (n, m) = (u64::from(s.table_angles), u64::from(s.table_densities));
+            for species in &scene.species {
+                let reason = format!("forests of species \"{}\" far away", species.name);
+                add(
+                    "data",
+                    &format!("forest tables of {}", species.name),
+                    reason,
+                    (n * n * n + n + 1) * m * 8,
+                );
+            }
             let maps: Vec<[u32; 2]> =
                 scene.species.iter().filter_map(|s| density_map_size(s, scene.terrain.extent)).collect();
             if !maps.is_empty() {
@@ -421,6 +432,12 @@ impl Plan {
                     + slots * 4
                     + slots / u64::from(gpu::CULL_GROUP) * 4 * u64::from(gpu::TREE_LISTS),
             );
+            add(
+                "target",
+                "shader-map nodes",
+                format!("trees far away on {} quads of terrain", self.terrain_tiles),
+                shader_map::bytes(self),
+            );
         }
         if self.cascades > 0 {
             add(
@@ -455,6 +472,9 @@ impl Plan {
         }
         if matches!(scene.sky, Sky::LatLong { .. }) {
             pass("sky", "the sky is an image");
+        }
+        if trees {
+            pass("shader-map", "trees beyond range, and average light");
         }
         pass("terrain", "the ground");
         if trees {

@@ -70,7 +70,7 @@ knobs! {
     cascades: u32, "", 1..=4, [3, 4, 4], "shadow cascades; each draws the trees of its slice again";
     cascade_size: u32, "texels", 64..=8192, [512, 1024, 2048], "texels a side of a cascade; fill cost";
     cascade_split: f32, "", 0.0..=1.0, [0.8, 0.8, 0.8], "0 uniform, 1 logarithmic cascade ranges (parallel-split)";
-    shadow_distance: f32, "m", 0.0..=1000000.0, [0.0, 0.0, 0.0], "range of the cascades; 0 is as far as trees are drawn one by one";
+    shadow_distance: f32, "m", 0.0..=1000000.0, [0.0, 0.0, 0.0], "range of the cascades; 0 is as far as light has not converged";
     coverage_size: u32, "texels", 32..=1024, [128, 256, 512], "texels a side of the coverage tile of a terrain quad; memory and the time to make one grow with the square";
     terrain_pixels: f32, "px", 1.0..=64.0, [12.0, 8.0, 4.0], "size of a terrain mesh cell on the screen; vertices grow with the inverse square";
     hotspot_amplitude: f32, "", 0.0..=1.0, [0.2, 0.2, 0.2], "a1 of the leaf-scale hotspot (BN12, eq. 8)";

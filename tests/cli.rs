@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use serde_json::Value;
 
 /// Small and coarse: what is tested here is the program, not the picture.
-const COARSE: [&str; 15] = [
+const COARSE: [&str; 21] = [
     "--size",
     "96x64",
     "--quality",
@@ -21,6 +21,12 @@ const COARSE: [&str; 15] = [
     "cascade_size=256",
     "--set",
     "occlusion_rays=8",
+    "--set",
+    "table_angles=6",
+    "--set",
+    "table_densities=3",
+    "--set",
+    "table_rays=64",
     "--quiet",
 ];
 
@@ -306,6 +312,7 @@ fn check_layers(path: &Path) {
     let rgb = |l| ["B", "G", "R"].map(|c| format!("{l}.{c}"));
     let expected = [
         &["depth.Z".to_string()][..],
+        &["lit_ground", "lit_tree", "shadowed_ground", "shadowed_tree"].map(|c| format!("fractions.{c}")),
         &rgb("radiance"),
         &rgb("sky"),
         &["species.id".into()],
@@ -318,6 +325,13 @@ fn check_layers(path: &Path) {
         for ((sum, sun), sky) in at("radiance").zip(at("sun")).zip(at("sky")) {
             assert!((sum - sun - sky).abs() <= 1e-6 * sum.max(1e-9), "{sum} {sun} {sky}");
         }
+    }
+    // Ground and trees, lit and not: shares of a pixel, four of them in half floats.
+    let fractions =
+        |k: usize| found.iter().filter(|(n, _)| n.starts_with("fractions.")).map(move |(_, v)| v[k]);
+    for k in 0..96 * 64 {
+        let sum: f64 = fractions(k).sum();
+        assert!(sum <= 1.0 + 4.0 / 2048.0, "{k}: {sum}");
     }
     assert!(found["trees.coverage"].iter().any(|a| *a > 0.0) && found["species.id"].iter().any(|s| *s > 0.0));
 }

@@ -428,10 +428,17 @@ fn lookups_are_continuous_and_finite() {
 
 #[test]
 fn angles_are_those_of_the_scaled_space() {
-    let (v, l, phi) = tables::angles([0.6, 0.0, 0.8], [0.0, 0.0, 1.0], 1.0);
-    assert!((v - 0.6f64.atan2(0.8)).abs() < 1e-12 && l == 0.0 && phi == 0.0);
-    let (v, l, phi) = tables::angles([0.6, 0.0, 0.8], [0.0, -0.6, 0.8], 0.5);
-    assert!((v - 0.6f64.atan2(0.4)).abs() < 1e-12 && (l - v).abs() < 1e-12 && (phi - PI / 2.0).abs() < 1e-12);
+    let up = [0.0, 0.0, 1.0];
+    let a = tables::angles([0.6, 0.0, 0.8], up, up, 1.0);
+    assert!((a.v - 0.6f64.atan2(0.8)).abs() < 1e-12 && a.l == 0.0 && a.phi == 0.0 && a.up == 1.0);
+    let a = tables::angles([0.6, 0.0, 0.8], [0.0, -0.6, 0.8], up, 0.5);
+    assert!((a.v - 0.6f64.atan2(0.4)).abs() < 1e-12 && (a.l - a.v).abs() < 1e-12);
+    assert!((a.phi - PI / 2.0).abs() < 1e-12 && (a.sec_v - (1.0f64 + 0.36 / 0.16).sqrt()).abs() < 1e-12);
+    // A slope of 45 degrees that descends to the east, seen level from there: crowns of half the width are as steep as 1 in 2.
+    let r = 0.5f64.sqrt();
+    let a = tables::angles([1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [r, 0.0, r], 0.5);
+    assert!((a.v - 2f64.atan()).abs() < 1e-12 && (a.l - 0.5f64.atan()).abs() < 1e-12);
+    assert!((a.phi - PI).abs() < 1e-12 && (a.up - 0.8f64.sqrt()).abs() < 1e-12);
 }
 
 /// The fast rays through a z-field are those of the oracle.

@@ -5,10 +5,10 @@
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec2 slope_at;
 layout(location = 2) flat in uint layer;
-layout(location = 6) in vec4 tree_sun;
-layout(location = 7) in vec4 tree_sky;
-layout(location = 8) in vec4 paths;
-layout(location = 9) in vec2 vertical;
+layout(location = 6) centroid in vec4 tree_sun;
+layout(location = 7) centroid in vec4 tree_sky;
+layout(location = 8) centroid in vec4 paths;
+layout(location = 9) centroid in vec2 vertical;
 
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 3) uniform sampler2DArray slope_tiles;
@@ -50,7 +50,9 @@ GroundLight ground_light() {
     Cover c = cover();
     // What the nodes know per thickness, times the pixel's own.
     float thickness = total_thickness(c);
-    float expected = 1.0 - exp(-thickness * vertical.y), nu = thickness > 0.0 ? tree_sky.w : 0.0;
+    float expected = 1.0 - exp(-thickness * vertical.y);
+    // Interpolation rounds beyond the values at the vertices.
+    float nu = thickness > 0.0 ? clamp(tree_sky.w, 0.0, 1.0) : 0.0, trees_lit = clamp(tree_sun.w, 0.0, 1.0);
     float ground_lit = exp(thickness * min(paths.y - paths.z, 0.0));
     float coverage = mix(expected, c.channels[0].x, c.resolved);
     float lit = HAS_SUN ? mix(shadow_maps(n, cosine, distance), ground_lit, nu) : 0.0;
@@ -60,10 +62,10 @@ GroundLight ground_light() {
     GroundLight g;
     vec3 sun = reflectance * (cosine * lit / PI) * view.v.sun_irradiance;
     vec3 sky = reflectance * (0.5 * (1.0 + n.z) * exp(-thickness * vertical.x) * contrast) * view.v.sky_radiance;
-    g.sun = mix(tree_sun.rgb, sun, open);
-    g.sky = mix(tree_sky.rgb, sky, open);
+    g.sun = mix(max(tree_sun.rgb, 0.0), sun, open);
+    g.sky = mix(max(tree_sky.rgb, 0.0), sky, open);
     g.trees = 1.0 - open;
     if (cosine <= 0.0) lit = 0.0;
-    g.fractions = vec4(open * vec2(lit, 1.0 - lit), (1.0 - open) * vec2(tree_sun.w, 1.0 - tree_sun.w));
+    g.fractions = vec4(open * vec2(lit, 1.0 - lit), (1.0 - open) * vec2(trees_lit, 1.0 - trees_lit));
     return g;
 }

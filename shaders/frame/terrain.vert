@@ -14,10 +14,12 @@ layout(location = 2) flat out uint layer;
 layout(location = 3) out vec3 cover_at;
 layout(location = 4) flat out float cover_disc;
 layout(location = 5) flat out uint cover_layer;
-layout(location = 6) out vec4 tree_sun;   // w: lit fraction of trees
-layout(location = 7) out vec4 tree_sky;   // w: nu
-layout(location = 8) out vec4 paths;      // over, seen, joint; w: coverage where ground is seen
-layout(location = 9) out vec2 vertical;   // sky, gap
+// At the centre of the covered samples: a pixel's centre beyond the edge of a triangle seen from its side would be
+// extrapolated far, to fractions beyond 0 and 1 and to negative light.
+layout(location = 6) centroid out vec4 tree_sun;   // w: lit fraction of trees
+layout(location = 7) centroid out vec4 tree_sky;   // w: nu
+layout(location = 8) centroid out vec4 paths;      // over, seen, joint; w: coverage where ground is seen
+layout(location = 9) centroid out vec2 vertical;   // sky, gap
 
 ForestNode forest_node(ivec2 at) {
     uint quad = uint(gl_InstanceIndex) * FOREST_NODES * FOREST_NODES;

@@ -23,20 +23,5 @@ vec3 leaf_phase(vec3 v, vec3 l, vec3 r, vec3 t) {
 // Sky seen from depth d on the axis of a cylindrical hole (BN12, eq. 9): 1 / (1 + d2 / r2), with 1 / r2 given.
 float hole_occlusion(float d, float inverse_r2) { return 1.0 / (1.0 + d * d * inverse_r2); }
 
-// 2 E3(x): the mean sky visibility of the ground under opaque Poisson crowns with optical thickness x = density times
-// area (PAPERS: D exactly), by E3 = (exp(-x) - x (exp(-x) - x E1)) / 2. E1 is Abramowitz & Stegun 5.1.53 (polynomial up
-// to 1, error below 2e-7) and 5.1.56 (x exp(x) E1 as a rational function above 1, error below 2e-8).
-float ground_visibility(float x) {
-    if (x < 1e-4) return 1.0 - 2.0 * max(x, 0.0);
-    x = min(x, 40.0);
-    float e = exp(-x);
-    float below = -log(x) + (-0.57721566 + x * (0.99999193 + x * (-0.24991055 + x * (0.05519968 +
-                  x * (-0.00976004 + x * 0.00107857)))));
-    float above = (0.2677737343 + x * (8.6347608925 + x * (18.0590169730 + x * (8.5733287401 + x)))) /
-                  (3.9584969228 + x * (21.0996530827 + x * (25.6329561486 + x * (9.5733223454 + x))));
-    float x_e1 = x <= 1.0 ? x * below : e * above;
-    return clamp(e - x * (e - x_e1), 0.0, 1.0);
-}
-
 // Contrast of the ground near trees (BN12, eq. 10): mean 1 where the expected coverage is right; never negative.
 float ground_contrast(float coverage, float expected, float a3) { return max(1.0 - a3 * (coverage - expected), 0.0); }

@@ -22,8 +22,10 @@ TableAngles table_angles(vec3 v, vec3 l, vec3 n, float k) {
     // atan2 keeps its precision where acos loses it.
     a.v = atan(length(cross(sv, sn)), cos_v);
     a.l = atan(length(cross(sl, sn)), cos_l);
-    float across = abs(dot(sn, cross(sv, sl))), along = dot(sv, sl) - cos_v * cos_l;
-    a.phi = atan(across, along + (along >= 0.0 ? 1e-9 : -1e-9));
+    // Of the parts along the ground, which are the same to the bit where v = l.
+    vec3 pv = sv - cos_v * sn, pl = sl - cos_l * sn;
+    float along = dot(pv, pl);
+    a.phi = atan(length(cross(pv, pl)), along + (along >= 0.0 ? 1e-9 : -1e-9));
     a.sec_v = 1.0 / max(cos_v, 1e-3);
     a.sec_l = 1.0 / max(cos_l, 1e-3);
     a.up = sn.z;

@@ -8,6 +8,8 @@
 #include "physics/masks.glsl"
 #include "physics/shadow.glsl"
 #include "physics/tonemap.glsl"
+#include "physics/handover.glsl"
+#include "physics/tables.glsl"
 
 struct Arguments {
     uvec4 a;
@@ -44,18 +46,33 @@ void main() {
         case 2u: r.a.xy = floatBitsToUint(vec2(angle_between(a.xyz, b.xyz), hotspot(a.xyz, b.xyz, c.x, c.y))); break;
         case 3u: r.a.xyz = floatBitsToUint(leaf_phase(a.xyz, b.xyz, vec3(c.x, a.w, c.z), vec3(c.y, b.w, c.w))); break;
         case 4u: r.a.x = floatBitsToUint(hole_occlusion(a.x, a.y)); break;
-        case 5u: r.a.x = floatBitsToUint(ground_visibility(a.x)); break;
-        case 6u: r.a.x = floatBitsToUint(ground_contrast(a.x, a.y, a.z)); break;
-        case 7u: r.a.x = covered_samples(a.x, a.y, i.a.z); break;
-        case 8u: r.a.x = mask_column(i.a.xyz, i.b.x, i.b.y); break;
-        case 9u: {
+        case 5u: r.a.x = floatBitsToUint(ground_contrast(a.x, a.y, a.z)); break;
+        case 6u: r.a.x = covered_samples(a.x, a.y, i.a.z); break;
+        case 7u: r.a.x = mask_column(i.a.xyz, i.b.x, i.b.y); break;
+        case 8u: {
             vec2 gradient = plane_gradient(a.xyz, b.xyz, c.xyz, vec3(a.w, b.w, c.w));
             r.a.xy = floatBitsToUint(gradient);
             break;
         }
-        case 10u: r.a.xyz = floatBitsToUint(tone_curve(a.xyz)); break;
-        case 11u: r.a.xyz = floatBitsToUint(srgb(a.xyz)); break;
-        case 12u: r.a.x = view_layer(int(i.a.x), int(i.a.y), int(i.a.z)); break;
+        case 9u: r.a.xyz = floatBitsToUint(tone_curve(a.xyz)); break;
+        case 10u: r.a.xyz = floatBitsToUint(srgb(a.xyz)); break;
+        case 11u: r.a.x = view_layer(int(i.a.x), int(i.a.y), int(i.a.z)); break;
+        case 12u: {
+            float open = open_ground(b.x, b.y, b.z, b.w);
+            r.a = floatBitsToUint(vec4(converged(a.x, a.y), handed_over(a.x), tree_fade(a.x, a.z), open));
+            break;
+        }
+        case 13u: {
+            TableAngles t = table_angles(a.xyz, b.xyz, c.xyz, a.w);
+            r.a = floatBitsToUint(vec4(t.v, t.l, t.phi, t.sec_v));
+            r.b.xyz = floatBitsToUint(vec3(t.sec_l, t.up, t.sun_facing));
+            break;
+        }
+        case 14u: {
+            vec3 at = table_coordinates(TableAngles(a.x, a.y, a.z, 1.0, 1.0, 1.0, 1.0), a.w);
+            r.a = floatBitsToUint(vec4(at, table_density(b.x, b.y, b.z)));
+            break;
+        }
     }
     results.items[k] = r;
 }

@@ -3,7 +3,7 @@
 //! # Angles
 //! BN12 measures in a space scaled vertically so that crowns are as high as wide: S = diag(1, 1, k), with
 //! k = `vertical_scale` = crown diameter / crown height. θ_v and θ_l are the zenith angles of S v and S l, v and l being
-//! unit vectors from the level ground to viewer and light; φ in [0, π] is the azimuth between them, 0 where v = l. Only the
+//! unit vectors from the ground to viewer and light, about the ground's normal S⁻¹ n (tables are of level ground); φ in [0, π] is the azimuth between them, 0 where v = l. Only the
 //! labels live in the scaled space: rays are cast in metres, along S⁻¹ of the scaled direction.
 //!
 //! # Density
@@ -32,6 +32,8 @@
 //! constant, and beyond x_max, where the last node holds, optical thickness still grows as x.
 
 use std::f64::consts::PI;
+
+use glam::DVec3;
 
 use crate::bake::tables::ForestTables;
 
@@ -89,9 +91,9 @@ pub fn light_coordinate(n: usize, theta_v: f64, theta_l: f64) -> f64 {
     let k0 = ridge(n) as f64;
     // t² = |θ_l − θ_v| / (room on that side).
     if l < v {
-        k0 - k0 * ((v - l) / v).min(1.0).sqrt()
+        k0 - k0 * ((v - l) / v.max(1e-6)).min(1.0).sqrt()
     } else if l > v {
-        k0 + ((n - 1) as f64 - k0) * ((l - v) / (THETA_MAX - v)).min(1.0).sqrt()
+        k0 + ((n - 1) as f64 - k0) * ((l - v) / (THETA_MAX - v).max(1e-6)).min(1.0).sqrt()
     } else {
         k0
     }
@@ -112,13 +114,46 @@ pub fn secant(theta: f64) -> f64 {
     1.0 / theta.cos().max(1e-3)
 }
 
-/// (θ_v, θ_l, φ) of unit vectors from the level ground to viewer and light, in the space scaled by `vertical_scale`. Where
-/// either is vertical φ is 0: nothing depends on it there.
-pub fn angles(v: [f64; 3], l: [f64; 3], vertical_scale: f64) -> (f64, f64, f64) {
-    let zenith = |w: [f64; 3]| w[0].hypot(w[1]).atan2(vertical_scale * w[2]);
-    let (cross, dot) = (v[0] * l[1] - v[1] * l[0], v[0] * l[0] + v[1] * l[1]);
-    // atan2(0, 0) = 0 where either is vertical.
-    (zenith(v), zenith(l), cross.abs().atan2(dot))
+/// Angles of viewer and light about the ground's normal in scaled space, and what else depends on them (BN12, eq. 2–5).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Angles {
+    /// θ_v, rad.
+    pub v: f64,
+    /// θ_l, rad.
+    pub l: f64,
+    /// φ in [0, π], rad.
+    pub phi: f64,
+    /// sec θ_v, at most 1000.
+    pub sec_v: f64,
+    /// sec θ_l, at most 1000.
+    pub sec_l: f64,
+    /// u(S⁻¹ n)·u_z, the factor of the density: trees per m² of the slope's plane in scaled space over those of level ground.
+    pub up: f64,
+    /// 1 where the sun is above the slope's horizon, smoothly 0 within two degrees of it.
+    pub sun_facing: f64,
+}
+
+/// Angles of unit vectors to viewer and light about the ground's unit normal n, in the space scaled by S = diag(1, 1, k), k =
+/// `vertical_scale`: directions become S v, normals S⁻¹ n. Where v = l, and where either is normal to the ground, φ is 0:
+/// nothing depends on it there.
+pub fn angles(v: [f64; 3], l: [f64; 3], n: [f64; 3], vertical_scale: f64) -> Angles {
+    let scaled = |w: [f64; 3]| DVec3::new(w[0], w[1], vertical_scale * w[2]).normalize();
+    let normal = DVec3::new(vertical_scale * n[0], vertical_scale * n[1], n[2]).normalize();
+    let (v, l) = (scaled(v), scaled(l));
+    let (cos_v, cos_l) = (v.dot(normal), l.dot(normal));
+    let zenith = |w: DVec3, cosine: f64| w.cross(normal).length().atan2(cosine);
+    // Of the parts along the ground; atan2(0, 0) = 0 where either has none.
+    let (pv, pl) = (v - cos_v * normal, l - cos_l * normal);
+    let t = (cos_l / 0.0349).clamp(0.0, 1.0);
+    Angles {
+        v: zenith(v, cos_v),
+        l: zenith(l, cos_l),
+        phi: pv.cross(pl).length().atan2(pv.dot(pl)),
+        sec_v: 1.0 / cos_v.max(1e-3),
+        sec_l: 1.0 / cos_l.max(1e-3),
+        up: normal.z,
+        sun_facing: t * t * (3.0 - 2.0 * t),
+    }
 }
 
 /// The two nodes around a coordinate, and the weight of the second.

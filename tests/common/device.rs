@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use canopy::bake::{Baked, load_or_bake_scene};
 use canopy::frame::Renderer;
+use canopy::gpu::interface::Seed;
 use canopy::gpu::{Gpu, GpuOptions, Resource, Shader};
 use canopy::plan::Plan;
 use canopy::scene::{self, Camera, Scene};
@@ -28,14 +29,16 @@ pub enum Function {
     Hotspot,
     LeafPhase,
     HoleOcclusion,
-    GroundVisibility,
     GroundContrast,
     CoveredSamples,
     MaskColumn,
-    Caster,
+    PlaneGradient,
     ToneCurve,
     Srgb,
     ViewLayer,
+    Handover,
+    TableAngles,
+    TableCoordinates,
 }
 
 /// The outcomes of a function for many arguments.
@@ -132,6 +135,11 @@ pub fn small_scene(text: &str) -> Scene {
 pub fn bake(scene: &Scene) -> Vec<Baked> {
     let cache = folder().join("bakes");
     load_or_bake_scene(scene, Some(&cache), true).unwrap().into_iter().map(|(b, _)| b).collect()
+}
+
+/// Index of a seed's species.
+pub fn species(seed: &Seed) -> usize {
+    (seed.species_density & 0xffff) as usize
 }
 
 /// A renderer of a scene for a camera.

@@ -90,7 +90,7 @@ impl Frame {
         let (side, cell) = (size * fine, texel / fine as f64);
         let mut open = vec![1.0; side * side];
         for (p, s) in &self.trees {
-            let r = self.crowns[s.species as usize][0] * f64::from(s.scale) / cell;
+            let r = self.crowns[device::species(s)][0] * f64::from(s.scale) / cell;
             let c = [0, 1].map(|k| (p[k] - low[k]) / cell);
             let range = |k: usize| {
                 let reach = |v: f64| v.clamp(0.0, side as f64) as usize;
@@ -104,7 +104,7 @@ impl Frame {
                 } else {
                     ((r * r - 1.0 / 12.0).sqrt() + 0.5 - d[0].hypot(d[1])).clamp(0.0, 1.0)
                 };
-                open[y * side + x] *= (1.0 - share).max(1.0 / 4096.0);
+                open[y * side + x] *= (1.0f64 - share).max(1.0 / 4096.0);
             }
         }
         let mut coverage = vec![0.0; size * size];
@@ -276,7 +276,7 @@ fn coverage_and_densities_are_those_of_the_trees() {
     for (species, axis, half) in (0..8).map(|k| (k & 1, k >> 1 & 1, k >> 2)) {
         let inside = |p: &[f64; 2]| usize::from(p[axis] >= 225.0) == half;
         let trees =
-            frame.trees.iter().filter(|(p, s)| s.species as usize == species && inside(p)).count() as f64;
+            frame.trees.iter().filter(|(p, s)| device::species(s) == species && inside(p)).count() as f64;
         let got = found[species][axis][half];
         println!("species {species} axis {axis} half {half}: {got:.0} of {trees}");
         // Thinned trees vary as a Poisson process at most. Listed ones are counted; but where the density jumps at the

@@ -5,7 +5,9 @@ use canopy::forest::cull::{CLASS_CAMERA, CLASS_CASCADE, bin_end, classify, tree_
 use canopy::frame::Renderer;
 use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
-use canopy::gpu::interface::{CULL_GROUP, DISTANCE_BINS, DrawCommand, MAX_CASCADES, TREE_LISTS, Tree, View};
+use canopy::gpu::interface::{
+    CAMERA_DRAWS, CULL_GROUP, DISTANCE_BINS, DrawCommand, MAX_CASCADES, TREE_LISTS, Tree, View,
+};
 use canopy::plan::Plan;
 use canopy::scene::{Camera, Distribution, Raster, Scene, TreePosition};
 use std::sync::Arc;
@@ -61,7 +63,7 @@ fn check(gpu: &Gpu, renderer: &Renderer, view: &View) -> (usize, usize, Vec<usiz
                 continue;
             }
             let seed = all[quad.region as usize * capacity + slot];
-            let kind = &forest.species.rows[seed.species as usize];
+            let kind = &forest.species.rows[device::species(&seed)];
             let centre = tree_centre(view, quad, &seed, kind);
             let want = classify(view, kind, centre, seed.scale);
             assert_eq!(got, want, "quad {k} slot {slot} at {centre:?}");
@@ -88,7 +90,7 @@ fn check(gpu: &Gpu, renderer: &Renderer, view: &View) -> (usize, usize, Vec<usiz
     for (k, (tree, (seed, centre))) in trees.iter().zip(&records).enumerate() {
         assert_eq!(
             (tree.identity, tree.species, tree.scale),
-            (seed.identity, seed.species, seed.scale),
+            (seed.identity, device::species(seed) as u32, seed.scale),
             "tree {k}"
         );
         assert_eq!(tree.centre, *centre, "tree {k}");
@@ -108,11 +110,14 @@ fn check(gpu: &Gpu, renderer: &Renderer, view: &View) -> (usize, usize, Vec<usiz
         (0..DISTANCE_BINS as usize - 1).filter(|k| d2 > view.bins[k / 4][k % 4]).count()
     };
     assert!(camera.windows(2).all(|w| bin(w[0]) <= bin(w[1])), "not front to back");
-    // Three draws of it: the bins that hold a tree of magnified texels, those of a few pixels, those between.
+    // Four draws of it: the bins that hold a tree of magnified texels; of those beyond, the bins of more than a few pixels;
+    // those of only a few; and those where all light is the average.
     let first_from = |distance: f64| {
         (1..DISTANCE_BINS).find(|b| bin_end(b - 1, plan.range) >= distance).unwrap_or(DISTANCE_BINS)
     };
-    let ends = [first_from(plan.draw_limits[0]), first_from(plan.draw_limits[1]), DISTANCE_BINS];
+    assert!(plan.draw_limits.is_sorted(), "{:?}", plan.draw_limits);
+    let limits = plan.draw_limits.map(first_from);
+    let ends: [u32; CAMERA_DRAWS as usize] = [limits[0], limits[1], limits[2], DISTANCE_BINS];
     let mut commands = Vec::new();
     let mut first = 0;
     for end in ends {

@@ -54,7 +54,7 @@ fn digest(p: &Picture) -> String {
     if let Some(l) = &p.linear {
         h.update(bytemuck::cast_slice(&l.sun)).update(bytemuck::cast_slice(&l.sky));
         h.update(bytemuck::cast_slice(&l.depth)).update(bytemuck::cast_slice(&l.coverage));
-        h.update(bytemuck::cast_slice(&l.species));
+        h.update(bytemuck::cast_slice(&l.species)).update(bytemuck::cast_slice(&l.fractions));
     }
     h.finalize().to_hex().to_string()
 }

@@ -102,7 +102,7 @@ fn leaf_phase_is_that_of_the_oracle_and_never_negative() {
 }
 
 #[test]
-fn sky_through_holes_and_over_the_ground_is_that_of_the_oracle() {
+fn sky_through_holes_and_contrast_of_the_ground_are_those_of_the_oracle() {
     let gpu = device::open();
     let depths = [0.0f32, 1e-20, 1e-3, 0.5, 1.0, 7.0, 30.0, 1e4, 1e10];
     let cases: Vec<[f32; 2]> =
@@ -115,19 +115,6 @@ fn sky_through_holes_and_over_the_ground_is_that_of_the_oracle() {
     }
     // Two products, a sum and a division of a value of at most 1.
     worst.within(8.0 * EPS, "hole occlusion");
-
-    let mut xs: Vec<f32> = (-300..=90).map(|k| 10f32.powf(k as f32 * 0.025)).collect();
-    xs.extend([0.0, 1e-38, 9.999e-5, 1.0001e-4, 39.99, 40.01, 1e6, 1e30]);
-    let arguments: Vec<Arguments> = xs.iter().map(|x| words(&[*x])).collect();
-    let mut worst = Worst::default();
-    for (x, out) in xs.iter().zip(evaluate(&gpu, Function::GroundVisibility, &arguments)) {
-        let (got, want) = (float(&out, 0), light::ground_visibility(f64::from(*x).min(700.0)));
-        assert!((0.0..=1.0).contains(&got), "{got} at {x}");
-        worst.note((got - want).abs(), || format!("x = {x}: {got} {want}"));
-    }
-    // E1 to 2e-7 times x2 <= 1; exp (3 + 2x ulp) times 1 + x - x e1 exp(x) <= 2: 2 exp(-x) (5 + 2x) half ulps; log 3 ulp;
-    // a dozen roundings of numbers up to 1 on the way.
-    worst.within(2e-7 + 20.0 * 1.2e-7, "ground visibility");
 
     let cases = [
         [0.0f32, 0.0, 1.0],
@@ -147,34 +134,55 @@ fn sky_through_holes_and_over_the_ground_is_that_of_the_oracle() {
 }
 
 #[test]
-fn casters_are_packed_as_the_oracle_packs_them() {
+fn planes_are_as_steep_to_the_sun_as_the_oracle_says() {
     let gpu = device::open();
-    let mut cases = Vec::new();
-    for k in 0..=400 {
-        let d = k as f32 / 400.0;
-        cases.push([d, 1.0 - d, 0.5]);
-        cases.push([d, d * 0.7, d]);
-    }
-    cases.extend([
-        [-1.0, -1.0, 0.0],
-        [2.0, 2.0, 0.999],
-        [1.0, 0.0, 2.0],
-        [0.0, 1.0, -1.0],
-        [1e30, 1e30, 0.3],
-    ]);
-    let arguments: Vec<Arguments> = cases.iter().map(|c| words(c)).collect();
-    for (c, out) in cases.iter().zip(evaluate(&gpu, Function::Caster, &arguments)) {
-        let want = shadow::pack_caster(f64::from(c[0]), f64::from(c[1]));
-        // Products are rounded before they are cut: one step of depth (24 bits), one of opacity at a tie.
-        assert!((out[0] >> 8).abs_diff(want >> 8) <= 1, "{c:?}: {:x} {want:x}", out[0]);
-        assert!((out[0] & 255).abs_diff(want & 255) <= 1, "{c:?}: {:x} {want:x}", out[0]);
-        // The same texel gives the same light, unless the depths are equal but for rounding.
-        let depth = f64::from(c[2]);
-        if (f64::from(out[0] >> 8) / 16_777_215.0 - depth).abs() > 1e-6 {
-            let want = shadow::caster_visibility(out[0], depth);
-            assert!((float(&out, 1) - want).abs() <= 2.0 * EPS, "{c:?}: {want} {}", float(&out, 1));
+    let unit = |v: [f64; 3]| glam::DVec3::from(v).normalize();
+    let mut cases: Vec<[[f32; 3]; 4]> = Vec::new();
+    let mut stream = hash::Stream::new(11);
+    // Level and gentle, vertical, overhanging and hanging upside down; and any.
+    let mut normals = vec![
+        [0.0, 0.0, 1.0],
+        [0.2, -0.1, 0.97],
+        [1.0, 0.0, 0.0],
+        [0.6, 0.7, 0.0],
+        [0.7, 0.0, -0.3],
+        [0.0, 0.0, -1.0],
+    ];
+    normals.extend((0..60).map(|_| [0, 1, 2].map(|_| stream.unit() - 0.5)));
+    // At the zenith, ordinary, grazing, on the horizon and below.
+    for (k, elevation) in [90.0, 89.9999, 60.0, 35.0, 3.0, 0.1, 0.0, -0.2].into_iter().enumerate() {
+        let ((sa, ca), (se, ce)) = ((1.3 * k as f64).sin_cos(), f64::to_radians(elevation).sin_cos());
+        let sun = glam::DVec3::new(sa * ce, ca * ce, se);
+        let x = unit([ca, -sa, 0.0]);
+        let y = sun.cross(x);
+        for n in &normals {
+            cases.push([unit(*n), x, y, sun].map(|v| v.as_vec3().into()));
+        }
+        // The plane that faces the sun, and planes that the sun grazes: to the bit, and by the least that counts.
+        for n in [sun, x, -y, -sun, x + 1e-3 * sun, y + 0.999e-3 * sun, y + 0.25 * sun] {
+            cases.push([n.normalize(), x, y, sun].map(|v| v.as_vec3().into()));
         }
     }
+    let arguments: Vec<Arguments> = cases
+        .iter()
+        .map(|[n, x, y, s]| words(&[n[0], n[1], n[2], s[0], x[0], x[1], x[2], s[1], y[0], y[1], y[2], s[2]]))
+        .collect();
+    let (mut worst, mut steepest) = (Worst::default(), 0);
+    for (c, out) in cases.iter().zip(evaluate(&gpu, Function::PlaneGradient, &arguments)) {
+        let [n, x, y, sun] = c.map(|v| v.map(f64::from));
+        let want = shadow::plane_gradient(n, x, y, sun);
+        let facing = (0..3).map(|k| n[k] * sun[k]).sum::<f64>().max(1e-3);
+        for (k, want) in want.into_iter().enumerate() {
+            // Three products of at most 1 and their sum, above and below; a division. Beyond the limit only it is left.
+            let room = EPS * (3.0 * 0.5 / facing + want.abs() * (3.0 / facing + 6.0));
+            worst.note((float(&out, k) - want).abs() / room, || {
+                format!("{c:?}[{k}]: {} {want}", float(&out, k))
+            });
+            steepest += usize::from(want.abs() == 2.0);
+        }
+    }
+    assert!(steepest > 50, "{steepest}: the limit is not tested");
+    worst.within(1.0, "plane gradient");
     gpu.close().unwrap();
 }
 

@@ -173,7 +173,7 @@ fn a_ridge_and_a_tree_throw_their_shadows_away_from_the_sun() {
     let centre = centre.map(|c| c / dark);
     let pixel = 70.0 * 2.0 * eye.tangents[1] / f64::from(SIZE[1]);
     let area = dark * pixel * pixel;
-    let bake = &device::bake(&scene)[0];
+    let bake = &device::bake(&scene)[0].species;
     println!(
         "shadow of {area:.1} m2 at {centre:?}; the tree covers {} m2, {} m high",
         bake.area, bake.height

@@ -78,7 +78,8 @@ fn without_trees_there_is_no_forest() {
     let gpu = device::open();
     let mut scene = scene();
     let forest = draw(&gpu, &scene);
-    let tree_passes = ["seeds", "coverage tiles", "cull", "prefix sums", "draw commands", "compact", "trees"];
+    let tree_passes =
+        ["seeds", "coverage tiles", "cull", "prefix sums", "draw commands", "compact", "shader-map", "trees"];
     let tree_items = [
         "z-field views of a",
         "seeds",
@@ -86,6 +87,8 @@ fn without_trees_there_is_no_forest() {
         "coverage sums",
         "point pattern",
         "trees and lists",
+        "forest tables of a",
+        "shader-map nodes",
     ];
     assert!(tree_passes.iter().all(|p| forest.draws(p)), "{:?}", forest.passes);
     assert!(tree_items.iter().all(|p| forest.has(p)), "{:?}", forest.items);
@@ -97,7 +100,18 @@ fn without_trees_there_is_no_forest() {
     for bare in [thinned, draw(&gpu, &scene)] {
         assert!(!tree_passes.iter().any(|p| bare.draws(p)), "{:?}", bare.passes);
         assert!(!tree_items.iter().any(|p| bare.has(p)), "{:?}", bare.items);
-        for name in ["seeds", "trees", "z-field views", "coverage tiles", "coverage sums"] {
+        let names = [
+            "seeds",
+            "trees",
+            "z-field views",
+            "coverage tiles",
+            "coverage sums",
+            "pair tables",
+            "view tables",
+            "shader-map nodes",
+        ];
+        for name in names {
+            assert!(forest.bytes(name) > 0, "{name}");
             assert_eq!(bare.bytes(name), 0, "{name}");
         }
         assert!(bare.draws("shadows"), "the ground still casts");

@@ -1,6 +1,6 @@
 //! Seeds as the device produces them: where, how many, always the same.
 
-use crate::device;
+use crate::device::{self, Worst};
 use canopy::frame::Renderer;
 use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
@@ -115,7 +115,7 @@ fn seeds_are_those_of_the_cpu() {
                 }
             }
         }
-        let got: Vec<_> = got.iter().map(|s| (s.identity, s.position, s.species)).collect();
+        let got: Vec<_> = got.iter().map(|s| (s.identity, s.position, device::species(s) as u32)).collect();
         assert_eq!(got, want, "quad {qx}, {qy}");
         total += got.len();
     }
@@ -175,14 +175,13 @@ fn as_many_seeds_as_the_density_says() {
     {
         (*m, *between_heights, *below_slope) = (Some(map.clone()), Some([-20.0, 40.0]), Some(45.0));
     }
-    // The densities' integrals by the midpoint rule, and over two halves, so that a mirrored map is seen.
-    let heights = scene.terrain.heights.as_ref().unwrap();
+    let heights = scene.terrain.heights.clone().unwrap();
     let (cell, side, n) = (scene.terrain.cell_size, scene.terrain.extent[0], 900);
-    let mut expected = [[0.0; 2]; 2];
-    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-        let [x, y] = [i, j].map(|k| (f64::from(k) + 0.5) * side / f64::from(n));
-        let [h, sx, sy] = height_and_slope(heights, x / cell, y / cell);
-        let slope = sx.hypot(sy) / cell;
+    // Height and slopes of the ground, and the density of either species.
+    let asked = |x: f64, y: f64| {
+        let [h, sx, sy] = height_and_slope(&heights, x / cell, y / cell);
+        let (sx, sy) = (sx / cell, sy / cell);
+        let slope = sx.hypot(sy);
         let sample = |a: f64, b: f64| {
             let at = |v: f64, n: u32| v.clamp(0.0, f64::from(n - 1)) as usize;
             f64::from(map.samples[at(b, 5) * 9 + at(a, 9)])
@@ -198,9 +197,16 @@ fn as_many_seeds_as_the_density_says() {
             * smoothstep(-26.0, -14.0, h)
             * (1.0 - smoothstep(34.0, 46.0, h))
             * (1.0 - smoothstep(t - t / 6.0, t + t / 6.0, slope));
+        ([h, sx, sy], [first, 0.08])
+    };
+    // The densities' integrals by the midpoint rule, and over two halves, so that a mirrored map is seen.
+    let mut expected = [[0.0; 2]; 2];
+    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+        let [x, y] = [i, j].map(|k| (f64::from(k) + 0.5) * side / f64::from(n));
+        let (_, densities) = asked(x, y);
         let area = (side / f64::from(n)).powi(2);
-        expected[0][usize::from(i >= n / 2)] += first * area;
-        expected[1][usize::from(j >= n / 2)] += 0.08 * area;
+        expected[0][usize::from(i >= n / 2)] += densities[0] * area;
+        expected[1][usize::from(j >= n / 2)] += densities[1] * area;
     }
     // Several seeds of the scene: single counts, and their sum, in which a small bias would show.
     let (mut found, mut points) = ([[0.0; 2]; 2], Vec::new());
@@ -212,7 +218,7 @@ fn as_many_seeds_as_the_density_says() {
             for half in 0..2 {
                 let inside = |p: &[f64; 2]| usize::from(p[species] >= 0.5 * side) == half;
                 let count =
-                    points.iter().filter(|(p, s)| s.species as usize == species && inside(p)).count() as f64;
+                    points.iter().filter(|(p, s)| device::species(s) == species && inside(p)).count() as f64;
                 let want: f64 = expected[species][half];
                 found[species][half] += count;
                 // Thinning an even pattern varies less than a Poisson process, whose variance is its mean: five sigma.
@@ -235,16 +241,27 @@ fn as_many_seeds_as_the_density_says() {
             "species {species} half {half}: {found} of {want}, within {room}"
         );
     }
+    let (mut slopes, mut densities) = (Worst::default(), Worst::default());
     for (p, s) in &points {
         assert!(p.iter().all(|v| (-1e-4..=side + 1e-4).contains(v)), "{p:?} is outside");
         // Bicubic heights up to 60 m in singles, at a place known to a few ulp of the quad's side: slopes below 2.
-        let want = height_at(&scene.terrain, p[0], p[1]);
+        let ([want, sx, sy], each) = asked(p[0], p[1]);
         assert!((f64::from(s.ground) - want).abs() < 1e-3, "{p:?}: ground at {} {want}", s.ground);
-        let range = [[0.9, 1.1], [1.0, 1.0]][s.species as usize];
+        let range = [[0.9, 1.1], [1.0, 1.0]][device::species(s)];
         assert!((range[0]..=range[1]).contains(&s.scale), "{}", s.scale);
-        let light = half::f16::from_bits(s.ground_light as u16).to_f32();
-        assert!(light > 0.3 && light <= 1.0, "{light}");
+        let half = |bits: u32| f64::from(half::f16::from_bits(bits as u16).to_f32());
+        // Half floats are within 2^-11; a place off by 1e-4 m moves a slope by its curvature, at most 0.4^2 60 m in cells of
+        // 15 m squared: 4e-6.
+        for (got, want) in [(half(s.slope), sx), (half(s.slope >> 16), sy)] {
+            slopes.note((got - want).abs() - want.abs() / 2048.0, || format!("{p:?}: slope {got} {want}"));
+        }
+        // The root of the density of all trees. Where limits are steep, 6 m of height and 0.17 of slope wide, 1e-3 m and
+        // 1e-5 of slope are 3e-4 and 1e-4 of a density of 0.12; the root at its least, 0.08, doubles that over 0.57.
+        let (got, want) = (half(s.species_density >> 16), (each[0] + each[1]).sqrt());
+        densities.note((got - want).abs() - want / 2048.0, || format!("{p:?}: density {got} {want}"));
     }
+    slopes.within(1e-5, "slopes beyond rounding");
+    densities.within(1e-4, "densities beyond rounding");
     gpu.close().unwrap();
 }
 

@@ -39,7 +39,7 @@ fn frame(gpu: &Gpu, scene: &Scene, camera: &Camera) -> Linear {
 }
 
 fn bake(scene: &Scene) -> Arc<SpeciesBake> {
-    device::bake(scene)[0].clone()
+    device::bake(scene)[0].species.clone()
 }
 
 /// World positions of the pixels that show the tree.

@@ -123,7 +123,7 @@ fn surfaces_are_those_of_the_oracle_within_the_filter() {
     let baked = device::bake(&scene);
     let plan = Plan::new(&scene, &scene.cameras[0], [64, 64], false, Some(gpu.info())).unwrap();
     let species = SpeciesData::new(&gpu, &scene, &plan, &baked).unwrap();
-    let field = &baked[0].views;
+    let field = &baked[0].species.views;
     let mut stream = Stream::new(77);
     let rays = rays(&mut stream);
     let words: Vec<[f32; 8]> = rays

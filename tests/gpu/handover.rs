@@ -1,0 +1,68 @@
+//! The hand-over from trees to the shader-map, against its twin in f64.
+
+use crate::device::{self, Arguments, Function, Worst, evaluate, float, words};
+use canopy::physics::handover;
+
+/// Relative rounding of a single operation.
+const EPS: f64 = 6e-8;
+
+#[test]
+fn trees_fade_and_the_shader_map_takes_over_as_the_oracle_says() {
+    let gpu = device::open();
+    let mut cases: Vec<[f32; 3]> = Vec::new();
+    let reaches =
+        (0..=300).map(|k| k as f32 / 200.0).chain([1e-30, 0.799_999_9, 0.8, 1.0, 1.000_000_1, 1e6, 1e30]);
+    for (k, reach) in reaches.enumerate() {
+        let end = [0.1, 0.5, 0.6, 0.8][k % 4];
+        cases.extend([0.0, 0.3, 0.5, 0.999_999_94].map(|u| [reach, end, u]));
+    }
+    let arguments: Vec<Arguments> = cases.iter().map(|c| words(c)).collect();
+    let (mut nu, mut over, mut fade) = (Worst::default(), Worst::default(), Worst::default());
+    for (c, out) in cases.iter().zip(evaluate(&gpu, Function::Handover, &arguments)) {
+        let [reach, end, u] = c.map(f64::from);
+        nu.note((float(&out, 0) - handover::converged(reach, end)).abs(), || format!("{c:?}"));
+        over.note((float(&out, 1) - handover::handed_over(reach)).abs(), || format!("{c:?}"));
+        fade.note((float(&out, 2) - handover::tree_fade(reach, u)).abs(), || format!("{c:?}"));
+        assert!((0..3).all(|k| (0.0..=1.0).contains(&float(&out, k))), "{c:?} {out:?}");
+    }
+    // t to 2.5 ulp, times the largest slope 1.5, and four operations on numbers up to 3.
+    nu.within(16.0 * EPS, "converged");
+    // 0.8 and a difference to an ulp of 1, times 5, times the largest slope 2.
+    over.within(24.0 * EPS, "handed over");
+    // Four roundings of numbers up to 1, times 10.
+    fade.within(40.0 * EPS, "fade of a tree");
+    gpu.close().unwrap();
+}
+
+#[test]
+fn ground_between_trees_is_as_open_as_the_oracle_says() {
+    let gpu = device::open();
+    let mut cases: Vec<[f32; 4]> = Vec::new();
+    for thickness in [0.0, 1e-30, 1e-4, 0.1, 0.7, 3.0, 30.0, 90.0, 1e4] {
+        for over in [0.0, 1e-12, 0.3, 0.9, 1.0] {
+            for coverage in [0.0, 1e-6, 0.4, 0.999, 1.0] {
+                cases.extend(
+                    [0.0, 1e-6, 0.3, 0.9, 63.0 / 64.0, 0.999_999_9, 1.0]
+                        .map(|e| [thickness, over, coverage, e]),
+                );
+            }
+        }
+    }
+    let arguments: Vec<Arguments> =
+        cases.iter().map(|c| words(&[0.0, 1.0, 0.0, 0.0, c[0], c[1], c[2], c[3]])).collect();
+    let mut worst = Worst::default();
+    for (c, out) in cases.iter().zip(evaluate(&gpu, Function::Handover, &arguments)) {
+        let [thickness, over, coverage, expected] = c.map(f64::from);
+        let (got, want) = (float(&out, 3), handover::open_ground(thickness, over, coverage, expected));
+        assert!((0.0..=1.0).contains(&got), "{c:?}: {got}");
+        // exp to (3 + 2x) ulp; the gap over the expected gap (up to 64) to a difference, a division of 2.5 ulp, four
+        // products of the share and the mix: twenty roundings.
+        let gap = (1.0 - coverage) / (1.0 - expected).max(1.0 / 64.0);
+        let room = EPS * (-thickness).exp() * (1.0 + gap) * (20.0 + 2.0 * (3.0 + 2.0 * thickness)) + 1e-37;
+        worst.note((got - want).abs() / room, || format!("{c:?}: {got} {want}"));
+        // Where discs are all that is seen, no ground shows in a disc.
+        assert!(over < 1.0 || coverage < 1.0 || got == 0.0, "{c:?}: {got}");
+    }
+    worst.within(1.0, "open ground");
+    gpu.close().unwrap();
+}
