@@ -35,12 +35,13 @@ float ground_height(sampler2DArray heights, vec2 position, float cell) {
 }
 
 // How far sight lines from the camera to the tree pass above the ground, m: the least of the following and of half the
-// tree's height; of no interest once it is not above 0. With d the distance of the tree, L the step and t = L 2^k:
+// tree's height; of no interest once it is not above 0. With L the step and t = L 2^k:
 //
-// - t behind the tree, the line through its centre. Ground there takes part in the shader-map: no silhouette.
-// - t before the tree, nearer than 16 L, the line through a point a tree's height above its centre: with half of that
-//   clearance the line through its top is free. Else terrain hides the tree.
-// - t before the tree, from 16 L on, the line a tree's height under the centre: the one through the centre has then left
+// - t behind the tree, the line through its top: how much of the tree stands out. Before ground that is no farther than
+//   64 L, the shader-map shows it.
+// - t before the tree, nearer than 16 L, the line half a tree's height above its top: when the one through the top meets
+//   the ground, half of the opacity is gone, and the terrain hides it anyway.
+// - t before the tree, from 16 L on, the line half a tree's height under its base: the one through its centre has then left
 //   the canopy. Trees of level ground seen at a grazing angle hide each other, and would all stay.
 //
 // Continuous in the camera's position, as the tree's opacity must be. `asked`: false gives 0 at no cost.
@@ -49,13 +50,14 @@ float silhouette(View v, SeedQuad q, Seed s, vec3 centre, float height, sampler2
     d2 = d2 + centre.y * centre.y;
     d2 = d2 + centre.z * centre.z;
     precise float u = v.silhouette_step * reciprocal_root(d2);
+    precise float top = centre.z + 0.5 * height;
     precise float least = asked ? 0.5 * height : 0.0;
     // The exit depends on data: drivers that run both sides of branches skip the rest of a loop.
     for (uint k = 0u; k < SILHOUETTE_STEPS && least > 0.0; k++) {
         precise vec2 behind = s.position + centre.xy * u;
         precise vec2 texel = vec2(q.texel) + (q.texel_offset + behind * v.cells_per_metre);
         precise float ground = ground_height(heights, texel, v.height_cell) - v.camera_height;
-        precise float clear = (centre.z + centre.z * u) - ground;
+        precise float clear = (top + top * u) - ground;
         least = min(least, clear);
         // No nearer the camera than half way.
         float w = min(u, 0.5);

@@ -64,13 +64,14 @@ pub fn clearance(
         ground_height(heights, texel, view.height_cell) - view.camera_height
     };
     let mut u = view.silhouette_step * reciprocal_root(d2);
+    let top = centre[2] + 0.5 * height;
     let mut least = 0.5 * height;
     for k in 0..STEPS {
         if least <= 0.0 {
             break;
         }
         let behind = ground([0, 1].map(|k| seed.position[k] + centre[k] * u));
-        least = least.min((centre[2] + centre[2] * u) - behind);
+        least = least.min((top + top * u) - behind);
         let w = u.min(0.5);
         let before = ground([0, 1].map(|k| seed.position[k] - centre[k] * w));
         let end = if k < CANOPY_STEP { centre[2] + height } else { centre[2] - height };
@@ -107,8 +108,8 @@ impl Ground<'_> {
 /// Seed quads whose trees may stand on a silhouette: beyond the plan's range, up to that of silhouettes.
 ///
 /// Vertical sections through the eye, one every few cells of the height map: along each, [`clearance`] is estimated from
-/// the heights in the section, always to the tree's favour, and what the terrain before it hides is left out. Trees are as
-/// tall as the plan's tallest, or any part of that.
+/// the heights in the section, to the tree's favour, and what the terrain before it hides is left out. Trees are as tall as
+/// the plan's tallest, or half of that.
 pub fn silhouette_quads(ground: &Ground, eye: &Eye, plan: &Plan) -> BTreeSet<(i32, i32)> {
     let extent = ground.terrain.extent;
     let farthest = [0, 1].map(|k| eye.position[k].abs().max((eye.position[k] - extent[k]).abs()));
@@ -181,10 +182,9 @@ fn section(
         // The rest as for one tree, and a tenth of the height more, so that the quad is there before its first tree.
         let clear = |step: u32| {
             let t = tall * f64::from(1u32 << step);
-            let (centre, skirt) = (base + 0.6 * tall, base - 0.15 * tall);
+            let (top, skirt) = (base + 1.1 * tall, base - 0.15 * tall);
             let before = (d - t).max(0.5 * d);
-            centre * (d + t) > lowest(d + t) * d
-                && (step < CANOPY_STEP || skirt * before > lowest(before) * d)
+            top * (d + t) > lowest(d + t) * d && (step < CANOPY_STEP || skirt * before > lowest(before) * d)
         };
         if base + 1.6 * tall > horizon * d && (0..STEPS).all(clear) {
             found(d);
