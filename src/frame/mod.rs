@@ -123,6 +123,11 @@ impl Renderer {
         })
     }
 
+    /// The scene that is drawn.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
     /// The plan that is drawn.
     pub fn plan(&self) -> &Plan {
         &self.plan

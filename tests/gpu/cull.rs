@@ -65,7 +65,7 @@ fn check(gpu: &Gpu, renderer: &Renderer, view: &View) -> (usize, usize, Vec<usiz
             let seed = all[quad.region as usize * capacity + slot];
             let kind = &forest.species.rows[device::species(&seed)];
             let centre = tree_centre(view, quad, &seed, kind);
-            let want = classify(view, kind, centre, seed.scale);
+            let want = classify(view, quad, &seed, kind, centre, renderer.scene().terrain.heights.as_ref());
             assert_eq!(got, want, "quad {k} slot {slot} at {centre:?}");
             if want == 0 {
                 continue;
