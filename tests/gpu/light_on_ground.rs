@@ -154,6 +154,8 @@ fn a_ridge_and_a_tree_throw_their_shadows_away_from_the_sun() {
          [[camera]]\nname = \"c\"\nposition = [0.0, 0.0, 9.0]\ntarget = [9.0, 9.0, 0.0]\nvertical_fov = 50.0\n",
     );
     scene.species = with_tree.species;
+    // Near enough to have its own light, not the average.
+    scene.settings.set("zfield_min_pixels", 0.5).unwrap();
     let tree = TreePosition { x: 200.0, y: 200.0, scale: Some(1.0), rotation: Some(0.0) };
     scene.species[0].distribution = Distribution::Positions(Arc::new(vec![tree]));
     let above = device::camera([200.0, 200.0, 70.0], [200.0, 200.0, 0.0]);
