@@ -28,6 +28,8 @@ fn hills() -> Scene {
     scene.terrain.heights = Some(Raster { width, height, samples });
     scene.terrain.cell_size = 30.0;
     scene.settings.set("cascades", 4.0).unwrap();
+    // Shadows reach as far as they ever do, so that every view has casters.
+    scene.settings.set("convergence", 0.8).unwrap();
     let place = |k: u32| TreePosition {
         x: f64::from(k % 60) * 15.0,
         y: f64::from(k / 60) * 21.0,
