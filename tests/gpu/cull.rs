@@ -115,7 +115,7 @@ fn check(gpu: &Gpu, renderer: &Renderer, view: &View) -> (usize, usize, Vec<usiz
     // Four draws of it: the bins that hold a tree of magnified texels; of those beyond, the bins of more than a few pixels;
     // those of only a few; and those where all light is the average.
     let first_from = |distance: f64| {
-        (1..DISTANCE_BINS).find(|b| bin_end(b - 1, plan.range) >= distance).unwrap_or(DISTANCE_BINS)
+        (1..DISTANCE_BINS).find(|b| bin_end(b - 1, plan.last_range()) >= distance).unwrap_or(DISTANCE_BINS)
     };
     assert!(plan.draw_limits.is_sorted(), "{:?}", plan.draw_limits);
     let limits = plan.draw_limits.map(first_from);
