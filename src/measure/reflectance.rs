@@ -162,6 +162,7 @@ fn mean_albedo(albedo: &crate::scene::Albedo) -> [f32; 3] {
 ///
 /// # Errors
 /// [`Error::Usage`] for angles that see no ground; [`Error::Device`] if the device fails.
+#[allow(clippy::too_many_arguments)]
 pub fn measure(
     gpu: &Gpu,
     scene: &Scene,
