@@ -336,6 +336,118 @@ fn check_layers(path: &Path) {
     assert!(found["trees.coverage"].iter().any(|a| *a > 0.0) && found["species.id"].iter().any(|s| *s > 0.0));
 }
 
+const PATCHES: &str = "[terrain]\nextent = 500.0\nalbedo = 0.2\n\
+    [[species]]\nname = \"a\"\nmodel = \"builtin:birch\"\ndensity = 0.02\n\
+    [sun]\nazimuth = 210.0\nelevation = 40.0\nirradiance = 1.0\n[sky]\nradiance = 0.1\n\
+    [[camera]]\nname = \"c\"\nposition = [40.0, 60.0, 15.0]\ntarget = [150.0, 180.0, 0.0]\nvertical_fov = 50.0\n";
+
+#[test]
+fn reflectance_is_a_table_of_numbers() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene(dir.path(), PATCHES);
+    let csv = dir.path().join("brf.csv");
+    let out = csv.to_str().unwrap();
+    let small = ["--patches", "2", "--patch-side", "20", "--patch-pixels", "16", "--out", out];
+    let lists = [
+        "--sun-zenith",
+        "45",
+        "--view-zenith",
+        "-60:60:30",
+        "--azimuth",
+        "0,90",
+        "--distance",
+        "50,20000",
+        "--slope",
+        "0,-35",
+        "--validate",
+    ];
+    let done = run(&[&["reflectance", &scene], &COARSE[..], &small, &lists].concat());
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let text = std::fs::read_to_string(&csv).unwrap();
+    let mut lines = text.lines();
+    let header = "representation,distance_m,sun_zenith_deg,view_zenith_deg,relative_azimuth_deg,slope_deg,k_lit_ground,\
+                  k_shadowed_ground,k_lit_tree,k_shadowed_tree,radiance_r,radiance_g,radiance_b,sun_r,sun_g,sun_b,sky_r,sky_g,\
+                  sky_b,stderr_r,stderr_g,stderr_b";
+    assert_eq!(lines.next(), Some(header));
+    let rows: Vec<Vec<&str>> = lines.map(|l| l.split(',').collect()).collect();
+    // Two distances; of the five by two views of the slope, which descends away from the sun, that of
+    // 60 degrees towards the sun turns its back.
+    assert_eq!(rows.len(), 2 * (10 + 9));
+    for row in &rows {
+        assert_eq!(row.len(), 22);
+        assert_eq!(row[0], "auto", "{row:?}");
+        let v: Vec<f64> = row[1..].iter().map(|t| t.parse().unwrap()).collect();
+        assert!(v.iter().all(|x| x.is_finite()) && v[5..].iter().all(|x| *x >= 0.0), "{row:?}");
+        // Means of half floats.
+        assert!((v[5..9].iter().sum::<f64>() - 1.0).abs() < 2.0 / 1024.0, "{row:?}");
+        for c in 0..3 {
+            // Seven decimals of each.
+            assert!((v[9 + c] - v[12 + c] - v[15 + c]).abs() < 2e-7 && v[9 + c] > 0.0, "{row:?}");
+        }
+    }
+    let views = |slope: f64| {
+        let of = |r: &&Vec<&str>| r[1] == "50" && r[5].parse() == Ok(slope);
+        rows.iter().filter(of).map(|r| (r[3].to_string(), r[4].to_string())).collect::<Vec<_>>()
+    };
+    let all: Vec<_> = ["0", "90"]
+        .iter()
+        .flat_map(|a| ["-60", "-30", "0", "30", "60"].map(|z| (z.to_string(), a.to_string())))
+        .collect();
+    assert_eq!(views(0.0), all);
+    assert_eq!(
+        views(-35.0),
+        all.iter().filter(|(z, a)| (z.as_str(), a.as_str()) != ("60", "0")).cloned().collect::<Vec<_>>()
+    );
+    // Without --out the same goes to the standard output.
+    let printed = run(&[&["reflectance", &scene], &COARSE[..], &small[..6], &lists].concat());
+    assert!(String::from_utf8(printed.stdout).unwrap() == text, "printed and written differ");
+    let one = ["--view-zenith", "0", "--representation", "zfield,shader-map", "--json"];
+    let report = json(&[&["reflectance", &scene], &COARSE[..], &small[..6], &one].concat());
+    assert_eq!(
+        (&report["command"], report["rows"].as_array().unwrap().len()),
+        (&Value::from("reflectance"), 2)
+    );
+    assert_eq!(report["rows"][1]["representation"], "shader-map");
+    assert_eq!(report["rows"][0]["sun_zenith_deg"], 50.0, "left out: the scene's");
+}
+
+#[test]
+fn reflectance_refuses_what_cannot_be_measured() {
+    let dir = tempfile::tempdir().unwrap();
+    let bare = scene(dir.path(), &PATCHES.replace("density = 0.02", "density = 0.0"));
+    for (args, hint) in [
+        (&["--view-zenith", "90"][..], "--view-zenith 90"),
+        (&["--view-zenith", "-86"], "--view-zenith -86"),
+        (&["--view-zenith", "a"], "--view-zenith"),
+        (&["--view-zenith", "0:90"], "FROM:TO:STEP"),
+        (&["--view-zenith", "0:60:0"], "--view-zenith"),
+        (&["--view-zenith", "0:60:-5"], "--view-zenith"),
+        (&["--azimuth", "0,,90"], "--azimuth"),
+        (&["--azimuth", "inf"], "--azimuth"),
+        (&["--sun-zenith", "100"], "--sun-zenith 100"),
+        (&["--sun-zenith", "nan"], "--sun-zenith"),
+        (&["--sun-zenith", "-5"], "--sun-zenith -5"),
+        (&["--slope", "0,70"], "--slope 70"),
+        (&["--distance", "0"], "--distance 0"),
+        (&["--distance", "1e9"], "--distance 1000000000"),
+        (&["--distance", "-5"], "--distance -5"),
+        (&["--density", "0"], "--density"),
+        (&["--density", "-1"], "--density"),
+        (&["--density", "nan"], "--density"),
+        (&["--representation", "mesh"], "shader-map"),
+        (&["--patches", "0"], "--patches"),
+        (&["--patch-side", "1000"], "--patch-side 1000"),
+        (&["--patch-side", "-1"], "--patch-side -1"),
+        (&["--patch-side", "nan"], "--patch-side"),
+        (&["--patch-pixels", "4"], "--patch-pixels"),
+        (&["--out", "a.txt"], "*.csv"),
+        (&[&bare, "--quiet"], "no trees"),
+    ] {
+        let text = refused(2, &[&["reflectance"], args].concat());
+        assert!(text.contains(hint), "{args:?}: {text}");
+    }
+}
+
 #[test]
 fn the_reader_may_leave() {
     let mut child = program().args(["plan", "--json"]).stdout(std::process::Stdio::piped()).spawn().unwrap();

@@ -18,6 +18,6 @@ float tree_fade(float reach, float u) { return clamp((0.9 + 0.1 * u - reach) * 1
 float open_ground(float thickness, float over, float coverage, float expected) {
     // Only the last of the hand-over tells discs apart: before, the trees themselves do.
     float share = over * over;
-    float between = mix(1.0, (1.0 - coverage) / max(1.0 - expected, 1.0 / 64.0), share * share);
-    return clamp(exp(-thickness) * between, 0.0, 1.0);
+    float between = share * share * ((expected - coverage) / max(1.0 - expected, 1.0 / 64.0));
+    return clamp(exp(-thickness) * (1.0 + between), 0.0, 1.0);
 }

@@ -15,6 +15,7 @@ mod light_on_ground;
 mod masks;
 mod plan;
 mod seeds;
+mod shader_map;
 mod tables;
 mod tree;
 mod views;
