@@ -56,7 +56,7 @@ pub struct Args {
     #[command(flatten)]
     scene: SceneOptions,
     /// Sun zenith angles, degrees; left out: the scene's
-    #[arg(long, value_name = "LIST", value_parser = list)]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true, value_parser = list)]
     sun_zenith: Option<List>,
     /// View zenith angles, degrees
     #[arg(long, value_name = "LIST", default_value = "-75:75:15", allow_hyphen_values = true, value_parser = list)]
@@ -65,7 +65,7 @@ pub struct Args {
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = list)]
     azimuth: List,
     /// Distances, m
-    #[arg(long, value_name = "LIST", default_value = "1000", value_parser = list)]
+    #[arg(long, value_name = "LIST", default_value = "1000", allow_hyphen_values = true, value_parser = list)]
     distance: List,
     /// Inclinations of the ground, degrees
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = list)]
@@ -74,13 +74,13 @@ pub struct Args {
     #[arg(long, value_name = "NAMES", default_value = "auto", value_delimiter = ',', value_parser = representation)]
     representation: Vec<Representation>,
     /// Trees per m² of all species together, instead of the scene's mean
-    #[arg(long, value_name = "TREES/M2")]
+    #[arg(long, value_name = "TREES/M2", allow_negative_numbers = true)]
     density: Option<f64>,
     /// Patches to average over; the standard error is theirs
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     patches: u32,
     /// Side of a patch, m
-    #[arg(long, value_name = "METRES", default_value_t = 150.0)]
+    #[arg(long, value_name = "METRES", default_value_t = 150.0, allow_negative_numbers = true)]
     patch_side: f64,
     /// Pixels along a side of the image of a patch
     #[arg(long, value_name = "N", default_value_t = 192, value_parser = clap::value_parser!(u32).range(8..=2048))]
@@ -132,6 +132,10 @@ pub fn run(args: &Args) -> Result<()> {
     if let Some(wanted) = args.density {
         let total: f64 = densities.iter().sum();
         densities.iter_mut().for_each(|d| *d *= wanted / total.max(1e-30));
+    }
+    // Before anything is baked.
+    if densities.iter().sum::<f64>() <= 0.0 {
+        return Err(Error::Usage("the scene has no trees to measure".into()));
     }
     let gpu = Gpu::new(&GpuOptions { device: args.device.clone(), validate: args.validate })?;
     let rows = all(args, &gpu, &scene, &camera, &densities);
