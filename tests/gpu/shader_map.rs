@@ -161,13 +161,15 @@ fn a_forest_far_away_is_what_the_tables_say() {
                     hotspot.note(error.fold(0.0, f64::max), at);
                     continue;
                 }
-                for c in 0..4 {
-                    fractions.note((f64::from(l.fractions[k][c]) - want[0][c]).abs(), at);
+                for (got, want) in l.fractions[k].iter().zip(want[0]) {
+                    fractions.note((f64::from(*got) - want).abs(), at);
                 }
-                for c in 0..3 {
-                    // Where the sun is behind the slope nothing is lit.
-                    sun.note((f64::from(l.sun[k][c]) - want[1][c]).abs() / want[1][c].max(1e-6), at);
-                    sky.note((f64::from(l.sky[k][c]) / want[2][c] - 1.0).abs(), at);
+                // Where the sun is behind the slope nothing is lit.
+                for (got, want) in l.sun[k].iter().zip(want[1]) {
+                    sun.note((f64::from(*got) - want).abs() / want.max(1e-6), at);
+                }
+                for (got, want) in l.sky[k].iter().zip(want[2]) {
+                    sky.note((f64::from(*got) / want - 1.0).abs(), at);
                 }
             }
         }
@@ -179,7 +181,7 @@ fn a_forest_far_away_is_what_the_tables_say() {
     // Half floats, 2^-11 each: of the density in its tile, of V and of W. Each moves an optical path L by that part, and
     // exp(-L) by at most 1/e of it; T, slopes and the stored fraction, another 2^-11 each of at most 1. Linear between nodes
     // of the mesh, 0.2 degrees apart, paths are within 1e-4.
-    fractions.within((3.0 / 2.718 + 3.0) / 2048.0 + 2e-4, "fractions");
+    fractions.within((3.0 / std::f64::consts::E + 3.0) / 2048.0 + 2e-4, "fractions");
     // The same of the terms of a sum; L reaches 3 where it matters at all; tables, slopes and radiance are half floats.
     sun.within((3.0 * 3.0 + 4.0) / 2048.0, "sunlight");
     sky.within((3.0 * 3.0 + 4.0) / 2048.0, "skylight");
