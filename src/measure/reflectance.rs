@@ -1,7 +1,7 @@
 //! Radiance of a forest patch against view angle, sun angle and distance (BN12, figures 7 and 8).
 //!
 //! A patch is a level or inclined plane with the scene's species at the scene's mean densities. It is looked at with parallel
-//! rays, as far as a lens allows: from [`CAMERA_DISTANCES`] patch sides away. Everything in the renderer that depends
+//! rays, as far as a lens allows: from 24 patch sides away. Everything in the renderer that depends
 //! on distance depends on the size of a pixel on the tree, and the texels of the shadow map; so the distance `s` is set
 //! by the pixel, s / `pixels_at_1m`, and by the texels that the scene camera's cascades have there. All distances see the
 //! same trees through the same rays, so that their ratio is much better known than either.

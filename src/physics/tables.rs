@@ -7,7 +7,7 @@
 //! labels live in the scaled space: rays are cast in metres, along S⁻¹ of the scaled direction.
 //!
 //! # Density
-//! x = λA: trees per m², times their mean horizontal area A = π `crown_radius`² E[scale²].
+//! x = λA: trees per m², times their mean horizontal area A = π `crown_radius`² E(scale²).
 //!
 //! # Nodes
 //! n = `angles` and m = `densities` of them:

@@ -120,7 +120,7 @@ pub struct ForestTables {
     pub ground_stderr: Vec<[f32; 2]>,
 }
 
-/// Mean horizontal area of a species' trees, m²: A = π `crown_radius`² E[scale²].
+/// Mean horizontal area of a species' trees, m²: A = π `crown_radius`² E(scale²).
 pub fn mean_area(shape: &Shape, [low, high]: [f32; 2]) -> f64 {
     let (low, high) = (f64::from(low), f64::from(high));
     let squares = (low * low + low * high + high * high) / 3.0;
