@@ -130,7 +130,7 @@ impl SeedData {
         let mut visible =
             if plan.range > 0.0 { self.select(tree, eye, plan.range, reach) } else { Vec::new() };
         if let Some(heights) = scene.terrain.heights.as_ref().filter(|_| plan.silhouette_reach > 1.0) {
-            let ground = Ground { heights, terrain: &scene.terrain };
+            let ground = Ground { heights, terrain: &scene.terrain, lowest: tree.total_range()[0] };
             self.add_silhouettes(&ground, plan, tree, eye, &mut visible);
         }
         let mut fresh = Vec::new();

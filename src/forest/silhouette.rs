@@ -87,6 +87,8 @@ pub struct Ground<'a> {
     pub heights: &'a Raster,
     /// All of it.
     pub terrain: &'a Terrain,
+    /// The lowest of it, m.
+    pub lowest: f64,
 }
 
 impl Ground<'_> {
@@ -113,7 +115,8 @@ impl Ground<'_> {
 pub fn silhouette_quads(ground: &Ground, eye: &Eye, plan: &Plan) -> BTreeSet<(i32, i32)> {
     let extent = ground.terrain.extent;
     let farthest = [0, 1].map(|k| eye.position[k].abs().max((eye.position[k] - extent[k]).abs()));
-    let to = plan.last_range().min(farthest[0].hypot(farthest[1]));
+    let seen = farthest[0].hypot(farthest[1]).min(view_distance(eye, ground.lowest));
+    let to = plan.last_range().min(seen);
     let from = plan.range - 2.0 * plan.quad_side;
     let mut found = BTreeSet::new();
     if from >= to {
@@ -192,6 +195,20 @@ fn section(
     }
 }
 
+/// The four edges of what the eye sees, as directions.
+fn corners(eye: &Eye) -> [[f64; 3]; 4] {
+    let [tx, ty] = eye.tangents;
+    [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
+        .map(|(i, j)| add(add(eye.forward, eye.right, i * tx), eye.up, j * ty))
+}
+
+/// Horizontal distance beyond which an eye that looks down sees nothing as high as `lowest`. No sight line descends less
+/// than all corners of the image do, because z + m·|(x, y)| is convex.
+fn view_distance(eye: &Eye, lowest: f64) -> f64 {
+    let slope = corners(eye).map(|[x, y, z]| z / x.hypot(y)).into_iter().fold(f64::NEG_INFINITY, f64::max);
+    if slope < 0.0 { (eye.position[2] - lowest).max(0.0) / -slope } else { f64::INFINITY }
+}
+
 /// First azimuth and width of what the eye sees, radians from east to north.
 fn azimuths(eye: &Eye) -> (f64, f64) {
     let [tx, ty] = eye.tangents;
@@ -202,8 +219,7 @@ fn azimuths(eye: &Eye) -> (f64, f64) {
     }
     let middle = eye.forward[1].atan2(eye.forward[0]);
     let (mut low, mut high) = (0.0f64, 0.0f64);
-    for (i, j) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
-        let corner = add(add(eye.forward, eye.right, i * tx), eye.up, j * ty);
+    for corner in corners(eye) {
         let turn = (corner[1].atan2(corner[0]) - middle + PI).rem_euclid(TAU) - PI;
         (low, high) = (low.min(turn), high.max(turn));
     }
