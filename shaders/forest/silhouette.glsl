@@ -39,8 +39,8 @@ float ground_height(sampler2DArray heights, vec2 position, float cell) {
 //
 // - t behind the tree, the line through its top: how much of the tree stands out. Before ground that is no farther than
 //   64 L, the shader-map shows it.
-// - t before the tree, nearer than 16 L, the line half a tree's height above its top: when the one through the top meets
-//   the ground, half of the opacity is gone, and the terrain hides it anyway.
+// - t before the tree, nearer than 16 L, the line half a tree's height above its top: ground as high as that hides the tree,
+//   and it has gone from full opacity to none behind that ground.
 // - t before the tree, from 16 L on, the line half a tree's height under its base: the one through its centre has then left
 //   the canopy. Trees of level ground seen at a grazing angle hide each other, and would all stay.
 //
