@@ -56,6 +56,7 @@
 #![warn(missing_docs)]
 
 pub mod bake;
+pub mod clock;
 pub mod error;
 pub mod forest;
 pub mod frame;

@@ -1,6 +1,7 @@
 //! The command line: one file a command, and no logic that the library does not have.
 
 mod bake;
+mod bench;
 mod devices;
 mod options;
 mod output;
@@ -38,6 +39,8 @@ struct Cli {
 enum Command {
     /// Draw one image of a scene: PNG, and linear EXR with named layers.
     Render(render::Args),
+    /// Measure frame times along a camera path: table, JSON, CSV, trace.
+    Bench(bench::Args),
     /// Radiance of a patch of the scene's forest against view angle, sun angle and distance, as CSV.
     Reflectance(reflectance::Args),
     /// Precompute a tree model ahead of time (otherwise done on first use), and measure how good it is.
@@ -54,6 +57,7 @@ enum Command {
 pub fn run() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Render(args) => render::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Reflectance(args) => reflectance::run(&args),
         Command::Bake(args) => bake::run(&args),
         Command::Tree(args) => tree::run(&args),

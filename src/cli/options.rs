@@ -86,7 +86,8 @@ fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     Ok([side(width)?, side(height)?])
 }
 
-fn assignment(text: &str) -> std::result::Result<(String, f64), String> {
+/// `KNOB=VALUE`.
+pub fn assignment(text: &str) -> std::result::Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("write KNOB=VALUE, such as samples=8")?;
     let number = value.trim().parse().map_err(|_| format!("\"{value}\" is no number"))?;
     Ok((name.trim().to_string(), number))

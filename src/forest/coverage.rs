@@ -157,6 +157,11 @@ impl CoverageData {
         })
     }
 
+    /// Contents thrown out of the cache so far.
+    pub fn evicted(&self) -> u32 {
+        self.cache.evicted() as u32
+    }
+
     /// First layer of the tile of a quad, if this frame uses it.
     pub fn layer(&self, key: &QuadKey) -> Option<u32> {
         self.cache.find(key).map(|slot| slot * self.groups)

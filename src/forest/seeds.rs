@@ -104,6 +104,11 @@ impl SeedData {
         })
     }
 
+    /// Contents thrown out of the cache so far.
+    pub fn evicted(&self) -> u32 {
+        self.cache.evicted() as u32
+    }
+
     /// The camera's quad and its position in it.
     pub fn camera_quad(&self, eye: &Eye) -> ([i32; 2], [f64; 2]) {
         let side = f64::from(self.parameters.quad_side);

@@ -116,6 +116,11 @@ impl TerrainData {
         })
     }
 
+    /// Contents thrown out of the cache so far.
+    pub fn evicted(&self) -> u32 {
+        self.cache.evicted() as u32
+    }
+
     /// Push constants of draws and dispatches, from a first quad on.
     pub fn parameters(&self, first_quad: u32) -> TerrainParameters {
         TerrainParameters {

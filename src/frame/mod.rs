@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 use crate::Result;
 use crate::bake::Baked;
+use crate::clock::{monotonic_ns, process_cpu_ms_since, process_cpu_ns};
 use crate::forest::coverage::CoverageData;
 use crate::forest::cull::{CullData, TreeCounts};
 use crate::forest::seeds::SeedData;
@@ -22,7 +23,7 @@ use crate::forest::species::SpeciesData;
 use crate::forest::tables::TableData;
 use crate::forest::terrain::TerrainData;
 use crate::gpu::interface::View;
-use crate::gpu::{Buffer, Gpu, PassTime};
+use crate::gpu::{Buffer, Gpu, Timing};
 use crate::image::Picture;
 use crate::plan::Plan;
 use crate::scene::{Camera, Scene};
@@ -69,19 +70,40 @@ pub struct Renderer {
     forest: Option<Forest>,
 }
 
+/// Contents of the caches, by cache.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Tiles {
+    /// Quads of terrain: heights and slopes.
+    pub terrain: u32,
+    /// Quads of tree seeds.
+    pub seeds: u32,
+    /// Coverage tiles.
+    pub coverage: u32,
+}
+
 /// What a frame took and drew.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct FrameReport {
-    /// GPU time of every pass, in order.
-    pub passes: Vec<PassTime>,
+    /// What its recording measured: GPU time of every pass, in order.
+    pub timing: Timing,
+    /// When it began, on the clock of [`crate::clock::monotonic_ns`].
+    pub start_ns: u64,
+    /// CPU wall time of choosing what is drawn and uploading it, waits for uploads included, ms.
+    pub stream_ms: f64,
+    /// CPU wall time of recording commands, ms.
+    pub record_ms: f64,
+    /// CPU time of all threads of the process from its beginning until the device was done, ms.
+    pub cpu_ms: Option<f64>,
+    /// Tiles produced.
+    pub produced: Tiles,
+    /// Tiles thrown out of their caches for others.
+    pub evicted: Tiles,
     /// Trees drawn.
     pub trees: TreeCounts,
     /// Terrain quads drawn to the image.
     pub terrain_quads: u32,
     /// Seed quads culled.
     pub seed_quads: u32,
-    /// Coverage tiles produced.
-    pub coverage_tiles: u32,
 }
 
 impl Renderer {
@@ -166,6 +188,8 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::render`].
     pub fn draw(&mut self, eye: &Eye, cascades: &[Cascade], exposure: f64) -> Result<(FrameReport, View)> {
+        let (start_ns, cpu) = (monotonic_ns(), process_cpu_ns());
+        let evicted = self.evicted();
         let (gpu, scene, plan) = (&self.gpu, &self.scene, &self.plan);
         let sun = self.light.direction;
         let [lowest, highest] = self.terrain.tree.total_range();
@@ -185,45 +209,80 @@ impl Renderer {
         let view = view::view(scene, plan, eye, &self.light, cascades, seeds, step);
         gpu.upload(&self.view, 0, &[view])?;
 
+        let record_ns = monotonic_ns();
         let mut recorder = gpu.record()?;
-        self.terrain.produce(&mut recorder, &draws);
-        if let (Some(forest), Some((fresh, tiles))) = (&self.forest, &work) {
-            forest.seeds.produce(&mut recorder, fresh, &self.terrain, &forest.species);
-            forest.coverage.produce(&mut recorder, tiles, &forest.seeds, &self.terrain, &forest.species);
-            let Forest { seeds, species, tables, .. } = forest;
-            forest.cull.record(&mut recorder, &self.view, seeds, species, tables, &self.terrain);
+        recorder.stage("stream", |r| {
+            self.terrain.produce(r, &draws);
+            if let (Some(forest), Some((fresh, tiles))) = (&self.forest, &work) {
+                forest.seeds.produce(r, fresh, &self.terrain, &forest.species);
+                forest.coverage.produce(r, tiles, &forest.seeds, &self.terrain, &forest.species);
+            }
+        });
+        if let Some(Forest { seeds, species, tables, cull, .. }) = &self.forest {
+            recorder.stage("visibility", |r| {
+                cull.record(r, &self.view, seeds, species, tables, &self.terrain);
+            });
         }
         let trees = self.forest.as_ref().map(|f| (&f.cull, &f.seeds, &f.species));
         let ground = (&self.terrain, &draws);
         self.shadows.record(&mut recorder, &self.view, &self.ground.indices, ground, trees);
-        if let Some(sky) = &self.sky {
-            sky.record(&mut recorder, &self.view, &self.targets);
-        }
-        let clear = self.sky.is_none().then(|| self.light.sky.map(|c| (c * self.light.scale) as f32));
-        let shadow_map = &self.shadows.map;
-        let forest = self.forest.as_ref().zip(self.shader_map.as_ref());
-        if let Some((forest, map)) = forest {
-            map.record(&mut recorder, &self.view, ground, forest);
-        }
-        self.ground.record(&mut recorder, &self.view, ground, forest, shadow_map, &self.targets, clear);
-        if let Some(forest) = &self.forest {
-            forest.pass.record(&mut recorder, &self.view, forest, shadow_map, &self.targets);
-        }
+        recorder.stage("image", |r| {
+            if let Some(sky) = &self.sky {
+                sky.record(r, &self.view, &self.targets);
+            }
+            let clear = self.sky.is_none().then(|| self.light.sky.map(|c| (c * self.light.scale) as f32));
+            let shadow_map = &self.shadows.map;
+            let forest = self.forest.as_ref().zip(self.shader_map.as_ref());
+            if let Some((forest, map)) = forest {
+                map.record(r, &self.view, ground, forest);
+            }
+            self.ground.record(r, &self.view, ground, forest, shadow_map, &self.targets, clear);
+            if let Some(forest) = &self.forest {
+                forest.pass.record(r, &self.view, forest, shadow_map, &self.targets);
+            }
+        });
         self.tonemap.record(&mut recorder, &self.targets, plan, exposure / self.light.scale);
-        let passes = recorder.submit()?;
+        let timing = recorder.submit()?;
+        let cpu_ms = process_cpu_ms_since(cpu);
+        let ms = |from: u64, to: u64| to.saturating_sub(from) as f64 * 1e-6;
+        let after = self.evicted();
 
         let trees = match &self.forest {
             Some(forest) if forest.seeds.visible > 0 => forest.cull.counts(gpu, cascades.len())?,
             _ => TreeCounts::default(),
         };
         let report = FrameReport {
-            passes,
+            start_ns,
+            stream_ms: ms(start_ns, record_ns),
+            record_ms: (ms(record_ns, timing.done_ns) - timing.wait_ms).max(0.0),
+            cpu_ms,
+            produced: Tiles {
+                terrain: draws.fresh.1,
+                seeds: work.as_ref().map_or(0, |(seeds, _)| seeds.fresh.1),
+                coverage: work.as_ref().map_or(0, |(_, coverage)| coverage.tiles),
+            },
+            // A cache that is made anew begins to count again.
+            evicted: Tiles {
+                terrain: after.terrain.saturating_sub(evicted.terrain),
+                seeds: after.seeds.saturating_sub(evicted.seeds),
+                coverage: after.coverage.saturating_sub(evicted.coverage),
+            },
+            timing,
             trees,
             terrain_quads: draws.camera.1,
             seed_quads: self.forest.as_ref().map_or(0, |f| f.seeds.visible),
-            coverage_tiles: work.map_or(0, |(_, tiles)| tiles.tiles),
         };
         Ok((report, view))
+    }
+
+    /// Tiles thrown out so far.
+    fn evicted(&self) -> Tiles {
+        let forest = self.forest.as_ref();
+        Tiles {
+            terrain: self.terrain.evicted(),
+            seeds: forest.map_or(0, |f| f.seeds.evicted()),
+            coverage: forest.map_or(0, |f| f.coverage.evicted()),
+        }
     }
 
     /// Reads the last frame back: the display picture, and with layers the linear image.

@@ -10,6 +10,7 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use super::memory::Retired;
 use super::program::{Sampler, make_samplers};
 use super::select::{DeviceInfo, choose};
+use super::timing::{Calibration, TimingState, calibration_extension};
 use crate::{Error, Result};
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -41,8 +42,13 @@ pub(super) struct Shared {
     pub submitted: AtomicU64,
     pub allocator: Mutex<Option<Allocator>>,
     pub retired: Mutex<Vec<(u64, Retired)>>,
+    /// The device's heaps and memory types.
+    pub memory: vk::PhysicalDeviceMemoryProperties,
+    /// Bytes of live allocations by heap.
+    pub heap_bytes: Mutex<[u64; vk::MAX_MEMORY_HEAPS]>,
     pub samplers: Vec<vk::Sampler>,
     pub info: DeviceInfo,
+    pub timing: TimingState,
     messages: Arc<Mutex<Vec<String>>>,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     instance: ash::Instance,
@@ -148,6 +154,15 @@ impl Gpu {
         all
     }
 
+    /// Bytes that live buffers and images hold in each heap, by the heap's number and kind.
+    pub fn heap_report(&self) -> Vec<(String, u64)> {
+        let bytes = lock(&self.shared.heap_bytes);
+        let name = |k: usize, local: bool| format!("{k} {}", if local { "device-local" } else { "host" });
+        let heaps = &self.shared.memory.memory_heaps[..self.shared.memory.memory_heap_count as usize];
+        let local = |h: &vk::MemoryHeap| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
+        heaps.iter().enumerate().map(|(k, h)| (name(k, local(h)), bytes[k])).collect()
+    }
+
     /// Waits for the device, then reports what should not be: validation messages and live allocations.
     /// Call it when every resource has been dropped.
     ///
@@ -231,7 +246,11 @@ fn open(
             as u32;
         let queue_info =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
-        let extensions = [khr::push_descriptor::NAME.as_ptr()];
+        let calibration = calibration_extension(&entry, &instance, physical);
+        let extensions: Vec<_> =
+            [Some(khr::push_descriptor::NAME), calibration].into_iter().flatten().map(CStr::as_ptr).collect();
+        let features =
+            vk::PhysicalDeviceFeatures::default().pipeline_statistics_query(info.pipeline_statistics);
         let mut f12 =
             vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true).shader_output_layer(true);
         let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
@@ -242,6 +261,7 @@ fn open(
         let create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queue_info)
             .enabled_extension_names(&extensions)
+            .enabled_features(&features)
             .push_next(&mut f12)
             .push_next(&mut f13);
         let device = instance
@@ -265,7 +285,16 @@ fn open(
         .map_err(|e| Error::Device(format!("allocator: {e}")))?;
         let samplers = make_samplers(&device)?;
         debug_assert_eq!(samplers.len(), Sampler::ALL.len());
+        let calibration = calibration.map(|name| {
+            if name == khr::calibrated_timestamps::NAME {
+                Calibration::Khr(khr::calibrated_timestamps::Device::new(&instance, &device))
+            } else {
+                Calibration::Ext(ext::calibrated_timestamps::Device::new(&instance, &device))
+            }
+        });
+        let valid_bits = families[family as usize].timestamp_valid_bits;
         Ok(Shared {
+            timing: TimingState { calibration, valid_bits, ..TimingState::default() },
             push: khr::push_descriptor::Device::new(&instance, &device),
             names: debug_utils.then(|| ext::debug_utils::Device::new(&instance, &device)),
             queue: device.get_device_queue(family, 0),
@@ -275,6 +304,8 @@ fn open(
             submitted: AtomicU64::new(0),
             allocator: Mutex::new(Some(allocator)),
             retired: Mutex::new(Vec::new()),
+            memory: instance.get_physical_device_memory_properties(physical),
+            heap_bytes: Mutex::new([0; vk::MAX_MEMORY_HEAPS]),
             samplers,
             info,
             messages,
@@ -293,6 +324,13 @@ impl Shared {
             // SAFETY: the handle belongs to this device. A failure only loses the name.
             let _ = unsafe { names.set_debug_utils_object_name(&info) };
         }
+    }
+
+    /// The heap of an allocation: that of the memory type with its properties.
+    pub fn heap_of(&self, allocation: &gpu_allocator::vulkan::Allocation) -> usize {
+        let types = &self.memory.memory_types[..self.memory.memory_type_count as usize];
+        let found = types.iter().find(|t| t.property_flags == allocation.memory_properties());
+        found.map_or(0, |t| t.heap_index as usize)
     }
 
     /// Keeps a resource until the submission that may still use it is done.
@@ -323,6 +361,7 @@ impl Drop for Shared {
             let _ = self.device.device_wait_idle();
             self.collect(u64::MAX);
             drop(lock(&self.allocator).take());
+            self.timing.destroy(&self.device);
             for s in &self.samplers {
                 self.device.destroy_sampler(*s, None);
             }

@@ -82,6 +82,7 @@ impl Retired {
                     return;
                 }
             };
+            lock(&shared.heap_bytes)[shared.heap_of(&allocation)] -= allocation.size();
             if let Some(allocator) = lock(&shared.allocator).as_mut() {
                 // Freeing fails only for foreign allocations; these are all ours.
                 let _ = allocator.free(allocation);
@@ -274,7 +275,7 @@ impl Gpu {
     ) -> Result<Allocation> {
         let mut guard = lock(&self.shared.allocator);
         let allocator = guard.as_mut().ok_or_else(|| Error::Device("the device is closing".into()))?;
-        allocator
+        let allocation = allocator
             .allocate(&AllocationCreateDesc {
                 name,
                 requirements,
@@ -282,7 +283,9 @@ impl Gpu {
                 linear,
                 allocation_scheme: AllocationScheme::GpuAllocatorManaged,
             })
-            .map_err(|e| Error::Device(format!("{name}, {} bytes: {e}", requirements.size)))
+            .map_err(|e| Error::Device(format!("{name}, {} bytes: {e}", requirements.size)))?;
+        lock(&self.shared.heap_bytes)[self.shared.heap_of(&allocation)] += allocation.size();
+        Ok(allocation)
     }
 }
 

@@ -14,6 +14,7 @@ mod memory;
 mod program;
 mod record;
 mod select;
+mod timing;
 mod transfer;
 
 pub use ash::vk;
@@ -22,8 +23,9 @@ pub use memory::{Buffer, Image, ImageDesc};
 pub use program::{DepthTest, GraphicsDesc, Program, Sampler};
 #[doc(hidden)]
 pub use record::Fault;
-pub use record::{Attachment, ComputePass, PassTime, Recorder, RenderPass, Resource, Targets, Work};
+pub use record::{Attachment, ComputePass, Recorder, RenderPass, Resource, Targets, Work};
 pub use select::{DeviceInfo, devices, find};
+pub use timing::{PassTime, PipelineStatistics, Timing, TimingOptions};
 
 /// A descriptor binding of a shader, from reflection; every binding is in set 0.
 #[derive(Clone, Copy, Debug)]

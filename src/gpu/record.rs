@@ -1,4 +1,4 @@
-//! Recording a frame: a pass is a label, a pair of timestamps and the barriers around its work.
+//! Recording a frame: a pass is a label, a pair of timestamps and the barriers around its work; a stage is several passes.
 
 use std::sync::atomic::Ordering;
 
@@ -8,19 +8,9 @@ use bytemuck::Pod;
 use super::context::{Gpu, device_error};
 use super::memory::{Buffer, Image};
 use super::program::{Program, Sampler};
+use super::timing::{MAX_SCOPES, Queries, Scope, Timing, TimingOptions};
+use crate::clock::{monotonic_ns, process_cpu_ms_since, process_cpu_ns};
 use crate::{Error, Result};
-
-/// Most passes in one recording.
-const MAX_PASSES: u32 = 256;
-
-/// GPU time of one pass.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct PassTime {
-    /// Name of the pass.
-    pub name: String,
-    /// Milliseconds between its two timestamps.
-    pub gpu_ms: f64,
-}
 
 /// What a shader binding gets.
 #[derive(Clone, Copy)]
@@ -71,8 +61,15 @@ pub enum Fault {
 pub struct Recorder<'g> {
     gpu: &'g Gpu,
     cmd: vk::CommandBuffer,
-    queries: vk::QueryPool,
-    passes: Vec<String>,
+    queries: Queries,
+    options: TimingOptions,
+    scopes: Vec<Scope>,
+    draws: u32,
+    dispatches: u32,
+    /// When the first submission began, ns.
+    submitted: Option<u64>,
+    /// Time from submissions to their ends, ns.
+    waited: u64,
     error: Option<Error>,
 }
 
@@ -95,26 +92,31 @@ impl Gpu {
     /// # Errors
     /// [`Error::Device`] when out of memory.
     pub fn record(&self) -> Result<Recorder<'_>> {
-        let s = &self.shared;
-        let pool = vk::QueryPoolCreateInfo::default()
-            .query_type(vk::QueryType::TIMESTAMP)
-            .query_count(2 * MAX_PASSES);
-        let allocate = vk::CommandBufferAllocateInfo::default()
-            .command_pool(s.pool)
-            .level(vk::CommandBufferLevel::PRIMARY)
-            .command_buffer_count(1);
-        // SAFETY: the pool is used by this thread only while the recorder borrows the Gpu; `Drop` frees both.
+        let options = self.timing();
+        let queries = self.take_queries(options.statistics)?;
+        let mut recorder = Recorder {
+            gpu: self,
+            cmd: vk::CommandBuffer::null(),
+            queries,
+            options,
+            scopes: Vec::new(),
+            draws: 0,
+            dispatches: 0,
+            submitted: None,
+            waited: 0,
+            error: None,
+        };
+        recorder.begin()?;
+        let (device, cmd) = (&self.shared.device, recorder.cmd);
+        // SAFETY: the command buffer is being recorded; no other recording uses the pools.
         unsafe {
-            let queries = s.device.create_query_pool(&pool, None).map_err(device_error("timestamps"))?;
-            let cmd = s.device.allocate_command_buffers(&allocate);
-            let cmd = cmd.map_err(device_error("command buffer"))?[0];
-            let recorder = Recorder { gpu: self, cmd, queries, passes: Vec::new(), error: None };
-            let begin =
-                vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-            s.device.begin_command_buffer(cmd, &begin).map_err(device_error("recording"))?;
-            s.device.cmd_reset_query_pool(cmd, queries, 0, 2 * MAX_PASSES);
-            Ok(recorder)
+            device.cmd_reset_query_pool(cmd, queries.stamps, 0, 2 * MAX_SCOPES + 2);
+            if let Some(pool) = queries.statistics {
+                device.cmd_reset_query_pool(cmd, pool, 0, MAX_SCOPES);
+            }
         }
+        recorder.stamp(0);
+        Ok(recorder)
     }
 
     /// Submits one command buffer and waits for it; then frees what was retired before.
@@ -145,43 +147,120 @@ impl<'g> Recorder<'g> {
         &self.gpu.shared.device
     }
 
-    fn pass(&mut self, name: &str, work: impl FnOnce(&mut Self)) {
-        let index = self.passes.len() as u32;
-        if index >= MAX_PASSES {
-            self.error.get_or_insert(Error::Usage(format!("more than {MAX_PASSES} passes in a frame")));
+    /// Begins a command buffer.
+    fn begin(&mut self) -> Result<()> {
+        let s = &self.gpu.shared;
+        let allocate = vk::CommandBufferAllocateInfo::default()
+            .command_pool(s.pool)
+            .level(vk::CommandBufferLevel::PRIMARY)
+            .command_buffer_count(1);
+        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the pool is used by this thread only while the recorder borrows the Gpu; `Drop` frees the buffer.
+        unsafe {
+            let cmd = s.device.allocate_command_buffers(&allocate);
+            self.cmd = cmd.map_err(device_error("command buffer"))?[0];
+            s.device.begin_command_buffer(self.cmd, &begin).map_err(device_error("recording"))
+        }
+    }
+
+    /// Submits what is recorded so far, waits for it, and returns the CPU time that all threads took meanwhile, ms.
+    fn flush(&mut self) -> Result<Option<f64>> {
+        let s = &self.gpu.shared;
+        let start = monotonic_ns();
+        self.submitted.get_or_insert(start);
+        let cpu = process_cpu_ns();
+        // SAFETY: every pass is closed; the buffer is freed after the wait, or by `Drop`.
+        unsafe { s.device.end_command_buffer(self.cmd) }.map_err(device_error("recording"))?;
+        self.gpu.submit(self.cmd)?;
+        let cpu = process_cpu_ms_since(cpu);
+        self.waited += monotonic_ns() - start;
+        // SAFETY: the submission is done.
+        unsafe { s.device.free_command_buffers(s.pool, &[std::mem::take(&mut self.cmd)]) };
+        Ok(cpu)
+    }
+
+    /// Writes a timestamp. A barrier follows because lavapipe may otherwise run the stamp after the work that it precedes.
+    fn stamp(&self, query: u32) {
+        if !self.options.stamps || self.cmd == vk::CommandBuffer::null() {
             return;
         }
-        self.passes.push(name.to_string());
-        let (device, cmd, queries) = (self.device(), self.cmd, self.queries);
-        let names = self.gpu.shared.names.as_ref();
-        let stamp = |query| {
-            // SAFETY: the command buffer is being recorded; the query was reset. A barrier follows because
-            // lavapipe may otherwise run the stamp after the work that it precedes.
-            unsafe {
-                let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
-                device.cmd_write_timestamp2(cmd, stage, queries, query);
-            }
-            barrier(device, cmd);
-        };
-        if let (Some(names), Ok(text)) = (names, std::ffi::CString::new(name)) {
-            // SAFETY: the command buffer is being recorded.
-            unsafe {
-                names.cmd_begin_debug_utils_label(cmd, &vk::DebugUtilsLabelEXT::default().label_name(&text))
-            };
+        let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
+        // SAFETY: the command buffer is being recorded; the query was reset.
+        unsafe { self.device().cmd_write_timestamp2(self.cmd, stage, self.queries.stamps, query) };
+        barrier(self.device(), self.cmd);
+    }
+
+    /// A named scope: its label and its stamps around `work`; returns its index.
+    fn within(&mut self, name: &str, pass: bool, work: impl FnOnce(&mut Self)) -> Option<usize> {
+        let index = self.scopes.len();
+        if index >= MAX_SCOPES as usize {
+            self.error.get_or_insert(Error::Usage(format!("more than {MAX_SCOPES} passes in a frame")));
+            return None;
         }
-        stamp(2 * index);
+        self.scopes.push(Scope { name: name.to_string(), pass, cpu_ms: None });
+        let gpu = self.gpu;
+        // Labels must close in the command buffer that they were opened in.
+        let names = gpu.shared.names.as_ref().filter(|_| pass || !self.options.apart);
+        if let (Some(names), Ok(text)) = (names, std::ffi::CString::new(name)) {
+            let label = vk::DebugUtilsLabelEXT::default().label_name(&text);
+            // SAFETY: the command buffer is being recorded.
+            unsafe { names.cmd_begin_debug_utils_label(self.cmd, &label) };
+        }
+        self.stamp(2 * index as u32 + 2);
         work(self);
-        barrier(device, cmd);
-        stamp(2 * index + 1);
+        if pass {
+            barrier(self.device(), self.cmd);
+        }
+        self.stamp(2 * index as u32 + 3);
         if let Some(names) = names {
             // SAFETY: the label was begun above.
-            unsafe { names.cmd_end_debug_utils_label(cmd) };
+            unsafe { names.cmd_end_debug_utils_label(self.cmd) };
+        }
+        Some(index)
+    }
+
+    fn pass(&mut self, name: &str, work: impl FnOnce(&mut Self)) {
+        // What a failed submission left cannot be recorded to.
+        if self.cmd == vk::CommandBuffer::null() {
+            return;
+        }
+        let index = self.within(name, true, work);
+        if let Some(index) = index.filter(|_| self.options.apart && self.error.is_none()) {
+            let done = self.flush().and_then(|cpu| self.begin().map(|()| cpu));
+            match done {
+                Ok(cpu) => self.scopes[index].cpu_ms = cpu,
+                Err(e) => self.error = Some(e),
+            }
+        }
+    }
+
+    /// A stage of several passes, timed as a whole too.
+    pub fn stage(&mut self, name: &str, work: impl FnOnce(&mut Self)) {
+        if self.cmd != vk::CommandBuffer::null() {
+            self.within(name, false, work);
+        }
+    }
+
+    /// Counts what the pipeline does in `work`, which is all of the last pass.
+    fn counted(&mut self, work: impl FnOnce(&mut Self)) {
+        let pool = self.queries.statistics.filter(|_| self.options.statistics);
+        let query = self.scopes.len() as u32 - 1;
+        if let Some(pool) = pool {
+            // SAFETY: the command buffer is being recorded; the query was reset.
+            unsafe { self.device().cmd_begin_query(self.cmd, pool, query, vk::QueryControlFlags::empty()) };
+        }
+        work(self);
+        if let Some(pool) = pool {
+            // SAFETY: the query was begun above.
+            unsafe { self.device().cmd_end_query(self.cmd, pool, query) };
         }
     }
 
     /// A pass of compute work.
     pub fn compute(&mut self, name: &str, work: impl FnOnce(&mut ComputePass)) {
-        self.pass(name, |r| work(&mut ComputePass { work: Work { recorder: r, program: None } }));
+        self.pass(name, |r| {
+            r.counted(|r| work(&mut ComputePass { work: Work { recorder: r, program: None } }));
+        });
     }
 
     /// A pass that draws to `targets`.
@@ -246,7 +325,8 @@ impl<'g> Recorder<'g> {
                 device.cmd_set_viewport(cmd, 0, &viewport);
                 device.cmd_set_scissor(cmd, 0, &[area]);
             }
-            work(&mut RenderPass { work: Work { recorder: r, program: None } });
+            // Inside the render pass: outside, fragments of the resolve would count too.
+            r.counted(|r| work(&mut RenderPass { work: Work { recorder: r, program: None } }));
             // SAFETY: rendering was begun above.
             unsafe { device.cmd_end_rendering(cmd) };
         });
@@ -279,42 +359,35 @@ impl<'g> Recorder<'g> {
         }
     }
 
-    /// Submits, waits, and returns the GPU time of every pass in order.
+    /// Submits, waits, and returns what the recording measured.
     ///
     /// # Errors
     /// What went wrong while recording, or [`Error::Device`].
-    pub fn submit(mut self) -> Result<Vec<PassTime>> {
+    pub fn submit(mut self) -> Result<Timing> {
         if let Some(e) = self.error.take() {
             return Err(e);
         }
-        let s = &self.gpu.shared;
-        // SAFETY: every pass is closed.
-        unsafe { s.device.end_command_buffer(self.cmd) }.map_err(device_error("recording"))?;
-        self.gpu.submit(self.cmd)?;
-        let mut ticks = vec![0u64; 2 * self.passes.len()];
-        if !ticks.is_empty() {
-            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-            // SAFETY: the submission that wrote the queries is complete.
-            unsafe { s.device.get_query_pool_results(self.queries, 0, &mut ticks, flags) }
-                .map_err(device_error("timestamps"))?;
-        }
-        let ns = f64::from(s.info.timestamp_ns);
-        let times = self.passes.iter().zip(ticks.chunks_exact(2)).map(|(name, t)| PassTime {
-            name: name.clone(),
-            gpu_ms: t[1].saturating_sub(t[0]) as f64 * ns * 1e-6,
-        });
-        Ok(times.collect())
+        self.stamp(1);
+        let clock = self.options.stamps.then(|| self.gpu.calibrate()).flatten();
+        self.flush()?;
+        let done_ns = monotonic_ns();
+        let scopes = std::mem::take(&mut self.scopes);
+        let timing = self.gpu.read_timing(self.queries, self.options, scopes, clock);
+        let (draws, dispatches) = (self.draws, self.dispatches);
+        let submit_ns = self.submitted.unwrap_or(done_ns);
+        let wait_ms = self.waited as f64 * 1e-6;
+        Ok(Timing { wait_ms, submit_ns, done_ns, draws, dispatches, ..timing })
     }
 }
 
 impl Drop for Recorder<'_> {
     fn drop(&mut self) {
         let s = &self.gpu.shared;
-        // SAFETY: the command buffer is either never submitted or already waited for.
-        unsafe {
-            s.device.free_command_buffers(s.pool, &[self.cmd]);
-            s.device.destroy_query_pool(self.queries, None);
+        if self.cmd != vk::CommandBuffer::null() {
+            // SAFETY: the command buffer is either never submitted or already waited for.
+            unsafe { s.device.free_command_buffers(s.pool, &[self.cmd]) };
         }
+        self.gpu.return_queries(self.queries);
     }
 }
 
@@ -456,7 +529,8 @@ impl ComputePass<'_, '_> {
         if groups.contains(&0) {
             return;
         }
-        let r = &*self.work.recorder;
+        let r = &mut *self.work.recorder;
+        r.dispatches += 1;
         // SAFETY: a program and its resources are bound.
         unsafe { r.device().cmd_dispatch(r.cmd, groups[0], groups[1], groups[2]) };
     }
@@ -471,14 +545,16 @@ impl ComputePass<'_, '_> {
 impl RenderPass<'_, '_> {
     /// Draws `vertices` vertices without an index buffer.
     pub fn draw(&mut self, vertices: u32, instances: u32) {
-        let r = &*self.work.recorder;
+        let r = &mut *self.work.recorder;
+        r.draws += 1;
         // SAFETY: a program and its resources are bound.
         unsafe { r.device().cmd_draw(r.cmd, vertices, instances, 0, 0) };
     }
 
     /// Draws with 32-bit indices; the arguments are the command at byte `offset` of `commands`.
     pub fn draw_indexed_indirect(&mut self, indices: &Buffer, commands: &Buffer, offset: u64) {
-        let r = &*self.work.recorder;
+        let r = &mut *self.work.recorder;
+        r.draws += 1;
         // SAFETY: both buffers are alive and hold what the shader that wrote them put there.
         unsafe {
             r.device().cmd_bind_index_buffer(r.cmd, indices.handle, 0, vk::IndexType::UINT32);
@@ -488,7 +564,8 @@ impl RenderPass<'_, '_> {
 
     /// Draws `count` 32-bit indices.
     pub fn draw_indexed(&mut self, indices: &Buffer, count: u32, instances: u32) {
-        let r = &*self.work.recorder;
+        let r = &mut *self.work.recorder;
+        r.draws += 1;
         // SAFETY: the buffer is alive and holds `count` indices.
         unsafe {
             r.device().cmd_bind_index_buffer(r.cmd, indices.handle, 0, vk::IndexType::UINT32);

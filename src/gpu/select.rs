@@ -34,6 +34,8 @@ pub struct DeviceInfo {
     pub sample_counts: u32,
     /// Nanoseconds a timestamp tick.
     pub timestamp_ns: f32,
+    /// It counts what the pipeline does.
+    pub pipeline_statistics: bool,
     /// Why canopy cannot use it; empty if it can.
     pub missing: Vec<String>,
 }
@@ -131,6 +133,7 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
         String::from_utf8_lossy(&bytes).into_owned()
     };
     let mut missing = Vec::new();
+    let mut pipeline_statistics = false;
     let (mut id, mut driver) =
         (vk::PhysicalDeviceIDProperties::default(), vk::PhysicalDeviceDriverProperties::default());
     let api = base.api_version;
@@ -146,6 +149,7 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
             instance.get_physical_device_features2(p, &mut f);
             instance.get_physical_device_properties2(p, &mut props);
         }
+        pipeline_statistics = f.features.pipeline_statistics_query == vk::TRUE;
         for (has, what) in [
             (f13.synchronization2, "synchronization2"),
             (f13.dynamic_rendering, "dynamicRendering"),
@@ -197,6 +201,7 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
             .sum(),
         sample_counts: (l.framebuffer_color_sample_counts & l.framebuffer_depth_sample_counts).as_raw(),
         timestamp_ns: l.timestamp_period,
+        pipeline_statistics,
         missing,
     }
 }

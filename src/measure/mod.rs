@@ -1,3 +1,10 @@
 //! What the program measures of itself. Draws through [`crate::frame`]; never touches Vulkan.
 
+pub mod bench;
+pub mod host;
+pub mod pace;
+pub mod path;
 pub mod reflectance;
+pub mod results;
+pub mod statistics;
+pub mod trace;

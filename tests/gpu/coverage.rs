@@ -387,7 +387,7 @@ fn every_quad_finds_its_place_in_a_tile_also_with_few_slots() {
         let crowns: Vec<_> =
             rows.iter().map(|r| [f64::from(r.crown_radius), f64::from(r.mean_area)]).collect();
         let held: Vec<_> = keys(tree).filter_map(|k| coverage.layer(&k).map(|layer| (layer, k))).collect();
-        assert!(held.len() as u32 == report.coverage_tiles && report.coverage_tiles <= capacity);
+        assert!(held.len() as u32 == report.produced.coverage && report.produced.coverage <= capacity);
         let (size, gutter) = (f64::from(coverage.tiles.size()[0]), f64::from(COVER_GUTTER));
         for quad in &quads {
             let (_, key) =
@@ -434,7 +434,7 @@ fn tiles_stay_and_are_the_same_bits_when_they_come_back() {
     let baked = device::bake(&scene);
     let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), plan, &baked).unwrap();
     let mut visit = |camera: &Camera| {
-        let produced = renderer.render(camera, 1.0).unwrap().coverage_tiles;
+        let produced = renderer.render(camera, 1.0).unwrap().produced.coverage;
         (produced, held(&gpu, &renderer))
     };
     let (first, tiles) = visit(&here);
@@ -459,11 +459,11 @@ fn without_trees_a_plain_is_one_quad_without_tiles() {
     let gpu = device::open();
     let (mut scene, camera) = long_view();
     let forest = draw(&gpu, &scene, &camera);
-    assert!(forest.report.coverage_tiles > 0 && forest.report.terrain_quads > 20);
+    assert!(forest.report.produced.coverage > 0 && forest.report.terrain_quads > 20);
     scene.species.clear();
     let mut renderer = device::renderer(&gpu, &scene, &camera, SIZE, false);
     let report = renderer.render(&camera, 1.0).unwrap();
-    assert_eq!((report.terrain_quads, report.coverage_tiles), (1, 0));
+    assert_eq!((report.terrain_quads, report.produced.coverage), (1, 0));
     assert_eq!(renderer.plan().terrain_tiles, 1);
     drop(renderer);
     gpu.close().unwrap();

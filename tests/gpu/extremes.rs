@@ -61,7 +61,7 @@ fn mean(values: impl IntoIterator<Item = f32>) -> f64 {
 }
 
 fn passes(report: &FrameReport) -> Vec<&str> {
-    report.passes.iter().map(|p| p.name.as_str()).collect()
+    report.timing.passes.iter().map(|p| p.name.as_str()).collect()
 }
 
 #[test]

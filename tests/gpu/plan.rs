@@ -27,7 +27,7 @@ fn draw(gpu: &Gpu, scene: &Scene) -> Drawn {
     let mut renderer = device::renderer(gpu, scene, camera, [64, 48], false);
     let report = renderer.render(camera, 1.0).unwrap();
     let plan = renderer.plan();
-    let passes: Vec<String> = report.passes.iter().map(|p| p.name.clone()).collect();
+    let passes: Vec<String> = report.timing.passes.iter().map(|p| p.name.clone()).collect();
     let planned: Vec<String> =
         plan.items.iter().filter(|i| i.kind == "pass").map(|i| i.name.clone()).collect();
     assert_eq!(passes, planned, "what is drawn is what is planned, in order");

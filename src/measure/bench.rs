@@ -1,0 +1,191 @@
+//! Frame timings along a camera path. Several subjects (settings) are drawn in turn, so that what changes on the machine
+//! changes for all of them.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use super::host::Host;
+use super::pace::pace_ms;
+use super::path::CameraPath;
+use super::results::{
+    BENCH_SCHEMA_VERSION, BenchResult, Cold, Frame, Memory, PathIdentity, SceneIdentity, Scope,
+};
+use crate::Result;
+use crate::clock::monotonic_ns;
+use crate::frame::camera::Eye;
+use crate::frame::{FrameReport, Renderer, auto_exposure};
+use crate::gpu::{Gpu, PassTime, TimingOptions};
+use crate::plan::Plan;
+use crate::progress::Progress;
+use crate::scene::{Camera, Scene};
+
+/// How to measure.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Where the camera goes.
+    pub path: CameraPath,
+    /// Seconds of the path between frames.
+    pub step: f64,
+    /// Most frames, of each subject.
+    pub frames: u32,
+    /// Most wall time of the samples, s.
+    pub duration: f64,
+    /// What recordings measure.
+    pub timing: TimingOptions,
+    /// The fixed work before every frame too.
+    pub pace: bool,
+}
+
+/// One setting to measure.
+pub struct Subject {
+    /// What draws.
+    pub renderer: Renderer,
+    /// What it took to make it; the frames are added here.
+    pub cold: Cold,
+}
+
+/// The plan that holds every view: of the views' own plans the one that takes most memory.
+///
+/// # Errors
+/// As [`Plan::new`].
+pub fn plan(scene: &Scene, views: &[Camera], size: [u32; 2], gpu: &Gpu) -> Result<Plan> {
+    let mut largest: Option<Plan> = None;
+    for view in views {
+        let eye = Eye::new(view, &scene.terrain, size);
+        let plan = Plan::for_eye(scene, &eye, false, Default::default(), Some(gpu.info()))?;
+        if largest.as_ref().is_none_or(|l| plan.bytes() > l.bytes()) {
+            largest = Some(plan);
+        }
+    }
+    match largest {
+        Some(plan) => Ok(plan),
+        None => Plan::new(scene, scene.camera(None)?, size, false, Some(gpu.info())),
+    }
+}
+
+/// Warms each subject up, then draws the path with all of them in turn, round after round, until there are frames enough or
+/// time is up. Of two subjects, which goes first alternates.
+///
+/// # Errors
+/// Those of [`Renderer::render`], and of a path without views.
+pub fn run(gpu: &Gpu, subjects: &mut [Subject], request: &Request, quiet: bool) -> Result<Vec<BenchResult>> {
+    let views = request.path.views(request.step)?;
+    gpu.set_timing(request.timing);
+    let pace = request.pace.then_some(());
+    let progress = Progress::new("warming up", 2 * subjects.len() as u64, quiet);
+    for subject in subjects.iter_mut() {
+        let exposure = auto_exposure(subject.renderer.scene());
+        let mut draw = || -> Result<f64> {
+            let start = Instant::now();
+            subject.renderer.render(&views[0], exposure)?;
+            progress.step(1);
+            Ok(start.elapsed().as_secs_f64())
+        };
+        (subject.cold.first_frame_s, subject.cold.second_frame_s) = (draw()?, draw()?);
+    }
+    progress.finish();
+
+    let progress = Progress::new("measuring", u64::from(request.frames) * subjects.len() as u64, quiet);
+    let (origin, start) = (monotonic_ns(), Instant::now());
+    let limit = Duration::try_from_secs_f64(request.duration).unwrap_or(Duration::MAX);
+    let mut frames: Vec<Vec<Frame>> = subjects.iter().map(|_| Vec::new()).collect();
+    for k in 0..request.frames as usize {
+        let (round, view) = (k / views.len(), k % views.len());
+        for turn in 0..subjects.len() {
+            // A B, B A: neither is always the first, and a drift over four frames cancels.
+            let which = if (round + view) % 2 == 0 { turn } else { subjects.len() - 1 - turn };
+            let subject = &mut subjects[which];
+            let pace_ms = pace.and_then(|()| pace_ms());
+            let exposure = auto_exposure(subject.renderer.scene());
+            let report = subject.renderer.render(&views[view], exposure)?;
+            let place = [round as u32, view as u32];
+            frames[which].push(Frame { pace_ms, ..frame(report, place, origin) });
+            progress.step(1);
+        }
+        if start.elapsed() >= limit {
+            break;
+        }
+    }
+    progress.finish();
+    let host = Host::here(&gpu.info().name, false);
+    let finished = subjects.iter().zip(frames).map(|(s, f)| result(gpu, s, f, request, views.len(), &host));
+    Ok(finished.collect())
+}
+
+/// What is kept of a frame's report.
+fn frame(report: FrameReport, [round, view]: [u32; 2], origin: u64) -> Frame {
+    let t = report.timing;
+    let since = |ns: u64| ns.saturating_sub(origin) as f64 * 1e-6;
+    let scopes = |all: Vec<PassTime>| all.into_iter().map(Scope::from).collect();
+    Frame {
+        round,
+        view,
+        start_ms: since(report.start_ns),
+        submit_ms: since(t.submit_ns),
+        done_ms: since(t.done_ns),
+        gpu_start_ms: t.gpu_start_ns.map(since),
+        stream_ms: report.stream_ms,
+        record_ms: report.record_ms,
+        wait_ms: t.wait_ms,
+        gpu_ms: t.gpu_ms,
+        cpu_ms: report.cpu_ms,
+        pace_ms: None,
+        draws: t.draws,
+        dispatches: t.dispatches,
+        trees_zfield: report.trees.camera,
+        shadow_casters: report.trees.cascades.iter().sum(),
+        terrain_quads: report.terrain_quads,
+        produced: report.produced,
+        evicted: report.evicted,
+        lost_stamps: t.lost,
+        passes: scopes(t.passes),
+        stages: scopes(t.stages),
+    }
+}
+
+impl From<PassTime> for Scope {
+    fn from(p: PassTime) -> Self {
+        let PassTime { name, gpu_ms, start_ms, cpu_ms, statistics } = p;
+        Scope { name, start_ms, gpu_ms, cpu_ms, statistics }
+    }
+}
+
+fn result(
+    gpu: &Gpu,
+    subject: &Subject,
+    frames: Vec<Frame>,
+    request: &Request,
+    views: usize,
+    host: &Host,
+) -> BenchResult {
+    let (scene, plan) = (subject.renderer.scene(), subject.renderer.plan());
+    let mut result = BenchResult {
+        schema_version: BENCH_SCHEMA_VERSION,
+        command: "bench".into(),
+        scene: SceneIdentity::new(scene),
+        path: PathIdentity {
+            name: request.path.name.clone(),
+            step_s: request.step,
+            views: views as u32,
+            keyframes: request.path.keyframes().to_vec(),
+        },
+        size: plan.size,
+        settings: BenchResult::settings_of(&scene.settings),
+        timing: gpu.timing().into(),
+        device: gpu.info().into(),
+        host: host.clone(),
+        cold: subject.cold.clone(),
+        memory: Memory {
+            planned: plan.bytes(),
+            heaps: gpu.heap_report().into_iter().collect(),
+            allocations: gpu.memory_report().into_iter().fold(BTreeMap::new(), |mut all, (name, bytes)| {
+                *all.entry(name).or_default() += bytes;
+                all
+            }),
+        },
+        metrics: BTreeMap::new(),
+        frames,
+    };
+    result.summarise();
+    result
+}
