@@ -37,6 +37,9 @@ pub enum Error {
     /// The validation layers spoke. Exit code 4.
     #[error("{0}")]
     Validation(String),
+    /// A comparison found something slower than allowed. Exit code 5.
+    #[error("{0}")]
+    Regression(String),
     /// Device lost or out of memory. Exit code 6.
     #[error("{0}")]
     Device(String),
@@ -70,6 +73,7 @@ impl Error {
             Error::Input { .. } | Error::Usage(_) | Error::Io { .. } => 2,
             Error::NoDevice(_) => 3,
             Error::Validation(_) => 4,
+            Error::Regression(_) => 5,
             Error::Device(_) => 6,
         }
     }

@@ -9,6 +9,7 @@ use canopy::bake::{Baked, cache, load_or_bake_scene};
 use canopy::frame::Renderer;
 use canopy::gpu::{Gpu, GpuOptions, TimingOptions};
 use canopy::measure::bench::{Request, Subject, plan, run as measure};
+use canopy::measure::compare::{Comparison, compare};
 use canopy::measure::path::CameraPath;
 use canopy::measure::results::{BenchResult, Cold};
 use canopy::measure::trace::trace;
@@ -80,6 +81,22 @@ pub struct Args {
     device: Option<String>,
     #[command(flatten)]
     print: PrintOptions,
+}
+
+/// What `--json` prints: a result, and with `--against` the second one.
+#[derive(serde::Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    result: &'a BenchResult,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    against: Option<Against<'a>>,
+}
+
+/// The second setting, and both compared.
+#[derive(serde::Serialize)]
+struct Against<'a> {
+    result: &'a BenchResult,
+    comparison: Comparison,
 }
 
 pub fn run(args: &Args) -> Result<()> {
@@ -166,12 +183,23 @@ fn report(args: &Args, results: &[BenchResult]) -> Result<()> {
         let text = serde_json::to_string(first).map_err(|e| Error::io(file, std::io::Error::other(e)))?;
         write(file, &(text + "\n"))?;
     }
+    let against =
+        results.get(1).map(|second| compare(first, second, true).map(|c| (second, c))).transpose()?;
     if args.print.json {
-        output::json(first)
+        let against = against.map(|(result, comparison)| Against { result, comparison });
+        output::json(&Report { result: first, against })
     } else if args.print.quiet {
         Ok(())
     } else {
-        output::print(&text(first))
+        let knobs: Vec<String> = args.against.iter().map(|(k, v)| format!("{k} = {v}")).collect();
+        let compared = against.map_or(String::new(), |(_, c)| {
+            format!(
+                "\nA as above, B with {}, drawn in turn\n\n{}",
+                knobs.join(", "),
+                super::compare::text(&c)
+            )
+        });
+        output::print(&(text(first) + &compared))
     }
 }
 

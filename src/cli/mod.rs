@@ -2,6 +2,7 @@
 
 mod bake;
 mod bench;
+mod compare;
 mod devices;
 mod options;
 mod output;
@@ -25,7 +26,7 @@ Start here:
   canopy render --help                 what can be changed, and every knob
 
 Exit codes: 0 done, 1 a check failed, 2 wrong usage or bad input, 3 no suitable device,
-4 validation error, 6 device lost or out of memory.";
+4 validation error, 5 regression found, 6 device lost or out of memory.";
 
 /// Draws forests from a leaf to the horizon, headless, on any Vulkan 1.3 driver.
 #[derive(Parser)]
@@ -41,6 +42,8 @@ enum Command {
     Render(render::Args),
     /// Measure frame times along a camera path: table, JSON, CSV, trace.
     Bench(bench::Args),
+    /// Compare two bench results: significance, not only a ratio; a gate with --fail-above.
+    Compare(compare::Args),
     /// Radiance of a patch of the scene's forest against view angle, sun angle and distance, as CSV.
     Reflectance(reflectance::Args),
     /// Precompute a tree model ahead of time (otherwise done on first use), and measure how good it is.
@@ -58,6 +61,7 @@ pub fn run() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Render(args) => render::run(&args),
         Command::Bench(args) => bench::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Reflectance(args) => reflectance::run(&args),
         Command::Bake(args) => bake::run(&args),
         Command::Tree(args) => tree::run(&args),

@@ -1,6 +1,7 @@
 //! What the program measures of itself. Draws through [`crate::frame`]; never touches Vulkan.
 
 pub mod bench;
+pub mod compare;
 pub mod host;
 pub mod pace;
 pub mod path;

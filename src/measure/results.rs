@@ -314,12 +314,10 @@ impl BenchResult {
         all
     }
 
-    /// Summarises the samples; a round of the path is a block, so that its views count alike.
+    /// Summarises the samples.
     pub fn summarise(&mut self) {
-        let block = self.path.views as usize;
         let samples = self.samples();
-        self.metrics =
-            samples.into_iter().filter_map(|(name, s)| Some((name, Summary::new(&s, block)?))).collect();
+        self.metrics = samples.into_iter().filter_map(|(name, s)| Some((name, Summary::new(&s)?))).collect();
     }
 
     /// A table with fixed columns, a row a frame, stage and pass.

@@ -1,0 +1,364 @@
+//! Two bench results: which passes got slower or faster, by how much, and how sure that is.
+//!
+//! Noise of a shared machine is one-sided (others can only slow a frame down), alike for neighbouring frames, and drifts from
+//! run to run for all passes alike. Hence:
+//!
+//! * **Views are blocks.** Frame k of both results shows the same view, so only times of the same view are compared, and of
+//!   the first round (whose caches are colder) only with the first.
+//! * **The least of several rounds** stands for a view: of each half of the rounds, so that a view gives two differences.
+//! * **What all passes have in common** is the machine, not a pass: on software drivers, whose two results come one after the
+//!   other, the median pass (by time) is taken off every pass, and listed apart. Results drawn in turn, and times of a
+//!   GPU's own clock, are compared as they are.
+//! * **Several passes are tested at once**, so p is corrected for that (Holm); it is the larger of the Mann-Whitney test's and
+//!   that of its paired form, Wilcoxon's signed ranks.
+//! * **A verdict needs size as well as significance**: [`Criteria`] says how much.
+
+use std::collections::BTreeMap;
+
+use super::results::{BenchResult, Frame};
+use super::statistics::{block_bootstrap, holm, mann_whitney, median, signed_rank};
+use crate::{Error, Result};
+
+/// Version of [`Comparison`]; raised when a key changes its meaning or goes.
+pub const COMPARE_SCHEMA_VERSION: u32 = 1;
+
+/// Row of the whole frame.
+pub const FRAME: &str = "frame";
+/// Row of what all passes have in common.
+pub const COMMON: &str = "all passes alike";
+
+/// What counts as a change.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Criteria {
+    /// Probability that any of the rows is called changed when none is.
+    pub level: f64,
+    /// Least relative change of a pass.
+    pub least_change: f64,
+    /// Least change of a pass as part of the frame: CPU times on software drivers have noise of 0.1 to 0.2 ms in any pass,
+    /// however short.
+    pub least_share: f64,
+    /// Least relative change that all passes have in common: smaller ones are the machine's from run to run.
+    pub least_common: f64,
+}
+
+impl Criteria {
+    /// Those for CPU times on software drivers, or for GPU times; measured on two shared cores (`tests/proofs/compare.rs`).
+    pub fn new(cpu: bool) -> Self {
+        let level = 0.05;
+        if cpu {
+            Criteria { level, least_change: 0.02, least_share: 0.006, least_common: 0.10 }
+        } else {
+            Criteria { level, least_change: 0.01, least_share: 0.001, least_common: f64::INFINITY }
+        }
+    }
+}
+
+/// What a row is called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Too small or too uncertain to call.
+    NoDifference,
+    /// B takes more time than A.
+    Slower,
+    /// B takes less.
+    Faster,
+}
+
+/// A pass, the frame, or what all passes have in common.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Row {
+    /// Name of the pass, [`FRAME`] or [`COMMON`].
+    pub name: String,
+    /// Mean over the views of the least time of A, ms.
+    pub a_ms: f64,
+    /// The same of B, as measured.
+    pub b_ms: f64,
+    /// B over A, without what all passes have in common.
+    pub ratio: f64,
+    /// 95 % interval of the ratio.
+    pub interval: [f64; 2],
+    /// p of the Mann-Whitney test on times less their view's mean.
+    pub mann_whitney_p: f64,
+    /// p of Wilcoxon's signed ranks on the differences of views.
+    pub signed_rank_p: f64,
+    /// The larger of the two, corrected for the number of rows.
+    pub corrected_p: f64,
+    /// The least ratio (or its inverse) that would be called a change.
+    pub least_ratio: f64,
+    /// What the row is called.
+    pub verdict: Verdict,
+}
+
+/// Two results compared.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Comparison {
+    /// [`COMPARE_SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// `compare`.
+    pub command: String,
+    /// What is compared: `cpu_ms` or `gpu_ms`.
+    pub quantity: &'static str,
+    /// The results were drawn in turn in one process.
+    pub in_turn: bool,
+    /// What counted.
+    pub criteria: Criteria,
+    /// Views that both results have.
+    pub views: u32,
+    /// Fixed work on the CPU, B over A: how much slower the machine was.
+    pub pace_ratio: Option<f64>,
+    /// In what the results differ besides times.
+    pub differences: Vec<Difference>,
+    /// The frame, what is common, and every pass.
+    pub rows: Vec<Row>,
+}
+
+/// Something that two results do not share.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Difference {
+    /// Kind, for `--allow-different`: one of [`Difference::KINDS`].
+    pub kind: &'static str,
+    /// What differs, with both values.
+    pub what: String,
+}
+
+impl Difference {
+    /// Kinds of differences that make times incomparable.
+    pub const KINDS: [&str; 6] = ["scene", "path", "size", "settings", "timing", "device"];
+}
+
+/// In what two results differ that makes their times incomparable.
+pub fn differences(a: &BenchResult, b: &BenchResult) -> Vec<Difference> {
+    let mut found = Vec::new();
+    let mut check = |kind, what: &str, a: &dyn std::fmt::Debug, b: &dyn std::fmt::Debug| {
+        let (a, b) = (format!("{a:?}"), format!("{b:?}"));
+        if a != b {
+            found.push(Difference { kind, what: format!("{what}: {a} and {b}") });
+        }
+    };
+    check("scene", "scene", &a.scene.name, &b.scene.name);
+    check("scene", "seed", &a.scene.seed, &b.scene.seed);
+    for name in
+        a.scene.assets.keys().chain(b.scene.assets.keys().filter(|k| !a.scene.assets.contains_key(*k)))
+    {
+        let short =
+            |r: &BenchResult| r.scene.assets.get(name).map(|h| h.chars().take(12).collect::<String>());
+        check("scene", name, &short(a), &short(b));
+    }
+    check(
+        "path",
+        "path",
+        &(&a.path.name, a.path.step_s, a.path.views),
+        &(&b.path.name, b.path.step_s, b.path.views),
+    );
+    if a.path.name == b.path.name {
+        check("path", "keyframes", &a.path.keyframes, &b.path.keyframes);
+    }
+    check("size", "size", &a.size, &b.size);
+    for name in a.settings.keys().chain(b.settings.keys().filter(|k| !a.settings.contains_key(*k))) {
+        check("settings", name, &a.settings.get(name), &b.settings.get(name));
+    }
+    check("timing", "timing", &a.timing, &b.timing);
+    check("device", "device", &a.device, &b.device);
+    check("device", "cpu", &a.host.cpu, &b.host.cpu);
+    check("device", "threads", &a.host.threads, &b.host.threads);
+    check("device", "driver variables", &a.host.variables, &b.host.variables);
+    found
+}
+
+/// A view of the first or of a later round.
+type Place = (bool, u32);
+/// Times of a pass by place, in the order of rounds; logarithms of ms.
+type Times = BTreeMap<Place, Vec<f64>>;
+
+/// Compares two results; `in_turn` if they were drawn in turn in one process.
+///
+/// # Errors
+/// [`Error::Usage`] when they have no view in common, or no times.
+pub fn compare(a: &BenchResult, b: &BenchResult, in_turn: bool) -> Result<Comparison> {
+    let cpu = a.device.kind == "cpu" && [a, b].iter().all(|r| r.frames.iter().all(|f| f.cpu_ms.is_some()));
+    let criteria = Criteria::new(cpu);
+    let names = {
+        let mut names = a.pass_names();
+        names.extend(b.pass_names().into_iter().filter(|n| !names.contains(n)).collect::<Vec<_>>());
+        names
+    };
+    let of = |r: &BenchResult, name: &str| times(r, |f| time(f, name, cpu));
+    let frame = Pairs::new(&of(a, FRAME), &of(b, FRAME))
+        .ok_or_else(|| Error::Usage("the two results have no view with times in common".into()))?;
+    let passes: Vec<(String, Pairs)> = names
+        .into_iter()
+        .filter_map(|n| {
+            let pairs = Pairs::new(&of(a, &n), &of(b, &n))?;
+            Some((n, pairs))
+        })
+        .collect();
+    let drift = cpu && !in_turn;
+    // The change of the median pass, by time, of all passes but one.
+    let common = |except: Option<usize>| -> f64 {
+        let mut all: Vec<(f64, f64)> = passes
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| Some(*k) != except)
+            .map(|(_, (_, p))| (p.change(), p.mean_ms()[0]))
+            .collect();
+        all.sort_by(|x, y| x.0.total_cmp(&y.0));
+        weighted_median(&all)
+    };
+    let mut rows = vec![frame.row(FRAME, if drift { common(None) } else { 0.0 })];
+    for (k, (name, pairs)) in passes.iter().enumerate() {
+        rows.push(pairs.row(name, if drift { common(Some(k)) } else { 0.0 }));
+    }
+    let corrected = holm(&rows.iter().map(|r| r.mann_whitney_p.max(r.signed_rank_p)).collect::<Vec<_>>());
+    let whole = rows[0].a_ms;
+    for (row, p) in rows.iter_mut().zip(corrected) {
+        row.corrected_p = p;
+        row.least_ratio = 1.0 + criteria.least_change.max(criteria.least_share * whole / row.a_ms);
+        row.judge(criteria.level);
+    }
+    if drift {
+        let mut row = frame.row(COMMON, 0.0);
+        let ratio = common(None).exp();
+        row.interval = row.interval.map(|i| i / row.ratio * ratio);
+        (row.ratio, row.corrected_p) = (ratio, row.mann_whitney_p.max(row.signed_rank_p));
+        row.least_ratio = 1.0 + criteria.least_common;
+        row.judge(criteria.level);
+        rows.insert(1, row);
+    }
+    let pace = Pairs::new(&times(a, |f| f.pace_ms), &times(b, |f| f.pace_ms));
+    Ok(Comparison {
+        schema_version: COMPARE_SCHEMA_VERSION,
+        command: "compare".into(),
+        quantity: if cpu { "cpu_ms" } else { "gpu_ms" },
+        in_turn,
+        criteria,
+        views: frame.least.len() as u32,
+        pace_ratio: pace.map(|p| p.change().exp()),
+        differences: differences(a, b),
+        rows,
+    })
+}
+
+impl Comparison {
+    /// Rows that are slower by more than a part, for a gate.
+    pub fn slower_than(&self, part: f64) -> Vec<&Row> {
+        self.rows.iter().filter(|r| r.verdict == Verdict::Slower && r.ratio > 1.0 + part).collect()
+    }
+}
+
+/// Time of a pass, or of the frame, ms.
+fn time(frame: &Frame, name: &str, cpu: bool) -> Option<f64> {
+    if name == FRAME {
+        return if cpu { frame.cpu_ms } else { frame.gpu_ms };
+    }
+    let pass = frame.passes.iter().find(|p| p.name == name)?;
+    if cpu { pass.cpu_ms } else { Some(pass.gpu_ms) }
+}
+
+fn times(r: &BenchResult, time: impl Fn(&Frame) -> Option<f64>) -> Times {
+    let mut all = Times::new();
+    for f in &r.frames {
+        if let Some(ms) = time(f).filter(|ms| *ms > 0.0) {
+            all.entry((f.round > 0, f.view)).or_default().push(ms.ln());
+        }
+    }
+    all
+}
+
+fn least(times: &[f64]) -> f64 {
+    times.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+/// Times of the same places in both results, logarithms of ms.
+struct Pairs {
+    /// The least of all rounds.
+    least: Vec<[f64; 2]>,
+    /// The least of each half of the rounds, with the place's number.
+    halves: Vec<(usize, [f64; 2])>,
+}
+
+impl Pairs {
+    /// `None` if there is no place with times in both.
+    fn new(a: &Times, b: &Times) -> Option<Self> {
+        let mut pairs = Pairs { least: Vec::new(), halves: Vec::new() };
+        for (place, x) in a {
+            let Some(y) = b.get(place) else { continue };
+            let k = pairs.least.len();
+            pairs.least.push([least(x), least(y)]);
+            // The same number of rounds of each: the least of more would be less.
+            let n = x.len().min(y.len());
+            let (first, last) = (n / 2, n - n / 2);
+            if first > 0 {
+                pairs.halves.push((k, [least(&x[..first]), least(&y[..first])]));
+            }
+            pairs.halves.push((k, [least(&x[n - last..n]), least(&y[n - last..n])]));
+        }
+        (!pairs.least.is_empty()).then_some(pairs)
+    }
+
+    /// Logarithm of B over A in the middle.
+    fn change(&self) -> f64 {
+        median(&self.least.iter().map(|[a, b]| b - a).collect::<Vec<_>>())
+    }
+
+    /// Means, ms.
+    fn mean_ms(&self) -> [f64; 2] {
+        let n = self.least.len() as f64;
+        [0, 1].map(|k| self.least.iter().map(|p| p[k].exp()).sum::<f64>() / n)
+    }
+
+    /// A row without verdict; `common` is taken off the logarithm.
+    fn row(&self, name: &str, common: f64) -> Row {
+        let changes: Vec<f64> = self.least.iter().map(|[a, b]| b - a - common).collect();
+        let differences: Vec<f64> = self.halves.iter().map(|(_, [a, b])| b - a - common).collect();
+        // Times less their place's mean.
+        let mut sums = vec![(0.0, 0.0); self.least.len()];
+        for (k, [a, b]) in &self.halves {
+            sums[*k] = (sums[*k].0 + a + b - common, sums[*k].1 + 2.0);
+        }
+        let aligned = |which: usize| -> Vec<f64> {
+            let shift = if which == 1 { common } else { 0.0 };
+            self.halves.iter().map(|(k, p)| p[which] - shift - sums[*k].0 / sums[*k].1).collect()
+        };
+        let [a_ms, b_ms] = self.mean_ms();
+        Row {
+            name: name.into(),
+            a_ms,
+            b_ms,
+            ratio: median(&changes).exp(),
+            interval: block_bootstrap(&changes, 2, 0.95, median).map(f64::exp),
+            mann_whitney_p: mann_whitney(&aligned(0), &aligned(1)),
+            signed_rank_p: signed_rank(&differences),
+            corrected_p: 1.0,
+            least_ratio: f64::INFINITY,
+            verdict: Verdict::NoDifference,
+        }
+    }
+}
+
+impl Row {
+    fn judge(&mut self, level: f64) {
+        self.verdict = if self.corrected_p >= level {
+            Verdict::NoDifference
+        } else if self.ratio >= self.least_ratio {
+            Verdict::Slower
+        } else if self.ratio <= 1.0 / self.least_ratio {
+            Verdict::Faster
+        } else {
+            Verdict::NoDifference
+        };
+    }
+}
+
+/// Median of ascending values by their weights; 0 without any.
+fn weighted_median(sorted: &[(f64, f64)]) -> f64 {
+    let half = 0.5 * sorted.iter().map(|x| x.1).sum::<f64>();
+    let mut sum = 0.0;
+    for (value, weight) in sorted {
+        sum += weight;
+        if sum >= half {
+            return *value;
+        }
+    }
+    0.0
+}
