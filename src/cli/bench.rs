@@ -11,6 +11,7 @@ use canopy::gpu::{Gpu, GpuOptions, TimingOptions};
 use canopy::measure::bench::{Request, Subject, plan, run as measure};
 use canopy::measure::compare::{Comparison, compare};
 use canopy::measure::path::CameraPath;
+use canopy::measure::report::markdown;
 use canopy::measure::results::{BenchResult, Cold};
 use canopy::measure::trace::trace;
 use canopy::scene::Scene;
@@ -76,6 +77,9 @@ pub struct Args {
     /// Write the result with every sample, as --json prints it
     #[arg(short, long, value_name = "FILE.json")]
     output: Option<PathBuf>,
+    /// Print a table in Markdown instead
+    #[arg(long, conflicts_with = "json")]
+    markdown: bool,
     /// Device by UUID or part of its name; left out: the best that fits (see `canopy devices`)
     #[arg(long, value_name = "UUID|NAME")]
     device: Option<String>,
@@ -188,6 +192,8 @@ fn report(args: &Args, results: &[BenchResult]) -> Result<()> {
     if args.print.json {
         let against = against.map(|(result, comparison)| Against { result, comparison });
         output::json(&Report { result: first, against })
+    } else if args.markdown {
+        output::print(&markdown(results))
     } else if args.print.quiet {
         Ok(())
     } else {

@@ -3,9 +3,10 @@
 //! Noise of a shared machine is one-sided (others can only slow a frame down), alike for neighbouring frames, and drifts from
 //! run to run for all passes alike. Hence:
 //!
-//! * **Views are blocks.** Frame k of both results shows the same view, so only times of the same view are compared, and of
-//!   the first round (whose caches are colder) only with the first.
-//! * **The least of several rounds** stands for a view: of each half of the rounds, so that a view gives two differences.
+//! * **Views are blocks.** Frame k of both results shows the same view, so only times of the same view are compared; the first
+//!   round, whose caches are colder, is left out where there are later ones.
+//! * **The least of several rounds** stands for a view; for the tests, of each half of the rounds, so that a view gives two
+//!   differences.
 //! * **What all passes have in common** is the machine, not a pass: on software drivers, whose two results come one after the
 //!   other, the median pass (by time) is taken off every pass, and listed apart. Results drawn in turn, and times of a
 //!   GPU's own clock, are compared as they are.
@@ -34,6 +35,8 @@ pub struct Criteria {
     pub level: f64,
     /// Least relative change of a pass.
     pub least_change: f64,
+    /// Least relative change of the whole frame.
+    pub least_frame: f64,
     /// Least change of a pass as part of the frame: CPU times on software drivers have noise of 0.1 to 0.2 ms in any pass,
     /// however short.
     pub least_share: f64,
@@ -46,9 +49,9 @@ impl Criteria {
     pub fn new(cpu: bool) -> Self {
         let level = 0.05;
         if cpu {
-            Criteria { level, least_change: 0.02, least_share: 0.006, least_common: 0.10 }
+            Criteria { level, least_change: 0.02, least_frame: 0.03, least_share: 0.008, least_common: 0.10 }
         } else {
-            Criteria { level, least_change: 0.01, least_share: 0.001, least_common: f64::INFINITY }
+            Criteria { level, least_change: 0.01, least_frame: 0.01, least_share: 0.001, least_common: 1e9 }
         }
     }
 }
@@ -178,62 +181,58 @@ type Times = BTreeMap<Place, Vec<f64>>;
 pub fn compare(a: &BenchResult, b: &BenchResult, in_turn: bool) -> Result<Comparison> {
     let cpu = a.device.kind == "cpu" && [a, b].iter().all(|r| r.frames.iter().all(|f| f.cpu_ms.is_some()));
     let criteria = Criteria::new(cpu);
-    let names = {
-        let mut names = a.pass_names();
-        names.extend(b.pass_names().into_iter().filter(|n| !names.contains(n)).collect::<Vec<_>>());
-        names
-    };
-    let of = |r: &BenchResult, name: &str| times(r, |f| time(f, name, cpu));
-    let frame = Pairs::new(&of(a, FRAME), &of(b, FRAME))
+    // The first round has colder caches and one sample a view: later ones, if there are several, know better.
+    let last = |r: &BenchResult| r.frames.iter().map(|f| f.round).max().unwrap_or(0);
+    let from = u32::from(last(a).min(last(b)) >= 2);
+    let pairs =
+        |time: &dyn Fn(&Frame) -> Option<f64>| Pairs::new(&times(a, from, time), &times(b, from, time));
+    let frame = pairs(&|f| time(f, FRAME, cpu))
         .ok_or_else(|| Error::Usage("the two results have no view with times in common".into()))?;
-    let passes: Vec<(String, Pairs)> = names
-        .into_iter()
-        .filter_map(|n| {
-            let pairs = Pairs::new(&of(a, &n), &of(b, &n))?;
-            Some((n, pairs))
-        })
-        .collect();
+    let mut names = a.pass_names();
+    names.extend(b.pass_names().into_iter().filter(|n| !names.contains(n)).collect::<Vec<_>>());
+    let passes: Vec<(String, Pairs)> =
+        names.into_iter().filter_map(|n| pairs(&|f| time(f, &n, cpu)).map(|pairs| (n, pairs))).collect();
     let drift = cpu && !in_turn;
-    // The change of the median pass, by time, of all passes but one.
-    let common = |except: Option<usize>| -> f64 {
-        let mut all: Vec<(f64, f64)> = passes
-            .iter()
-            .enumerate()
-            .filter(|(k, _)| Some(*k) != except)
-            .map(|(_, (_, p))| (p.change(), p.mean_ms()[0]))
-            .collect();
-        all.sort_by(|x, y| x.0.total_cmp(&y.0));
-        weighted_median(&all)
+    // The change of the median pass, by time, of all passes but one; in all rounds, and in each half of them.
+    let common = |except: Option<usize>| -> [f64; 3] {
+        let others = || passes.iter().enumerate().filter(|(k, _)| Some(*k) != except).map(|(_, (_, p))| p);
+        [0, 1, 2].map(|part| {
+            let mut all: Vec<(f64, f64)> =
+                others().filter_map(|p| Some((p.change(part)?, p.mean_ms()[0]))).collect();
+            all.sort_by(|x, y| x.0.total_cmp(&y.0));
+            if drift { weighted_median(&all) } else { 0.0 }
+        })
     };
-    let mut rows = vec![frame.row(FRAME, if drift { common(None) } else { 0.0 })];
-    for (k, (name, pairs)) in passes.iter().enumerate() {
-        rows.push(pairs.row(name, if drift { common(Some(k)) } else { 0.0 }));
-    }
+    let mut rows = vec![frame.row(FRAME, common(None))];
+    rows.extend(passes.iter().enumerate().map(|(k, (name, pairs))| pairs.row(name, common(Some(k)))));
     let corrected = holm(&rows.iter().map(|r| r.mann_whitney_p.max(r.signed_rank_p)).collect::<Vec<_>>());
     let whole = rows[0].a_ms;
     for (row, p) in rows.iter_mut().zip(corrected) {
         row.corrected_p = p;
-        row.least_ratio = 1.0 + criteria.least_change.max(criteria.least_share * whole / row.a_ms);
+        let least = if row.name == FRAME { criteria.least_frame } else { criteria.least_change };
+        // Of the smaller of the two times, so that A and B may change places.
+        let smaller = row.a_ms * row.ratio.min(1.0);
+        row.least_ratio = 1.0 + least.max(criteria.least_share * whole / smaller);
         row.judge(criteria.level);
     }
     if drift {
-        let mut row = frame.row(COMMON, 0.0);
-        let ratio = common(None).exp();
+        let mut row = frame.row(COMMON, [0.0; 3]);
+        let ratio = common(None)[0].exp();
         row.interval = row.interval.map(|i| i / row.ratio * ratio);
         (row.ratio, row.corrected_p) = (ratio, row.mann_whitney_p.max(row.signed_rank_p));
         row.least_ratio = 1.0 + criteria.least_common;
         row.judge(criteria.level);
         rows.insert(1, row);
     }
-    let pace = Pairs::new(&times(a, |f| f.pace_ms), &times(b, |f| f.pace_ms));
+    let pace = pairs(&|f| f.pace_ms).and_then(|p| p.change(0));
     Ok(Comparison {
         schema_version: COMPARE_SCHEMA_VERSION,
         command: "compare".into(),
         quantity: if cpu { "cpu_ms" } else { "gpu_ms" },
         in_turn,
         criteria,
-        views: frame.least.len() as u32,
-        pace_ratio: pace.map(|p| p.change().exp()),
+        views: frame.places.len() as u32,
+        pace_ratio: pace.map(f64::exp),
         differences: differences(a, b),
         rows,
     })
@@ -255,9 +254,10 @@ fn time(frame: &Frame, name: &str, cpu: bool) -> Option<f64> {
     if cpu { pass.cpu_ms } else { Some(pass.gpu_ms) }
 }
 
-fn times(r: &BenchResult, time: impl Fn(&Frame) -> Option<f64>) -> Times {
+/// Times of the frames from a round on, by place.
+fn times(r: &BenchResult, from: u32, time: &dyn Fn(&Frame) -> Option<f64>) -> Times {
     let mut all = Times::new();
-    for f in &r.frames {
+    for f in r.frames.iter().filter(|f| f.round >= from) {
         if let Some(ms) = time(f).filter(|ms| *ms > 0.0) {
             all.entry((f.round > 0, f.view)).or_default().push(ms.ln());
         }
@@ -269,57 +269,56 @@ fn least(times: &[f64]) -> f64 {
     times.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-/// Times of the same places in both results, logarithms of ms.
+/// Times of A and B of the same places, logarithms of ms: the least of all rounds, of the first half of them, if there are
+/// two or more, and of the second.
 struct Pairs {
-    /// The least of all rounds.
-    least: Vec<[f64; 2]>,
-    /// The least of each half of the rounds, with the place's number.
-    halves: Vec<(usize, [f64; 2])>,
+    places: Vec<[Option<[f64; 2]>; 3]>,
 }
 
 impl Pairs {
     /// `None` if there is no place with times in both.
     fn new(a: &Times, b: &Times) -> Option<Self> {
-        let mut pairs = Pairs { least: Vec::new(), halves: Vec::new() };
-        for (place, x) in a {
-            let Some(y) = b.get(place) else { continue };
-            let k = pairs.least.len();
-            pairs.least.push([least(x), least(y)]);
-            // The same number of rounds of each: the least of more would be less.
-            let n = x.len().min(y.len());
-            let (first, last) = (n / 2, n - n / 2);
-            if first > 0 {
-                pairs.halves.push((k, [least(&x[..first]), least(&y[..first])]));
-            }
-            pairs.halves.push((k, [least(&x[n - last..n]), least(&y[n - last..n])]));
-        }
-        (!pairs.least.is_empty()).then_some(pairs)
+        let both = a.iter().filter_map(|(place, x)| Some((x, b.get(place)?)));
+        let places: Vec<_> = both
+            .map(|(x, y)| {
+                // The same number of rounds of each: the least of more would be less.
+                let n = x.len().min(y.len());
+                let half = n / 2;
+                let of =
+                    |from: usize, to: usize| (to > from).then(|| [least(&x[from..to]), least(&y[from..to])]);
+                [of(0, n), of(0, half), of(half, n)]
+            })
+            .collect();
+        (!places.is_empty()).then_some(Pairs { places })
     }
 
-    /// Logarithm of B over A in the middle.
-    fn change(&self) -> f64 {
-        median(&self.least.iter().map(|[a, b]| b - a).collect::<Vec<_>>())
+    /// Logarithm of B over A in the middle, in all rounds (0) or in a half of them (1, 2).
+    fn change(&self, part: usize) -> Option<f64> {
+        let all: Vec<f64> = self.places.iter().filter_map(|p| p[part]).map(|[a, b]| b - a).collect();
+        (!all.is_empty()).then(|| median(&all))
     }
 
-    /// Means, ms.
+    /// Means of the least times, ms.
     fn mean_ms(&self) -> [f64; 2] {
-        let n = self.least.len() as f64;
-        [0, 1].map(|k| self.least.iter().map(|p| p[k].exp()).sum::<f64>() / n)
+        let all: Vec<[f64; 2]> = self.places.iter().filter_map(|p| p[0]).collect();
+        [0, 1].map(|k| all.iter().map(|p| p[k].exp()).sum::<f64>() / all.len() as f64)
     }
 
-    /// A row without verdict; `common` is taken off the logarithm.
-    fn row(&self, name: &str, common: f64) -> Row {
-        let changes: Vec<f64> = self.least.iter().map(|[a, b]| b - a - common).collect();
-        let differences: Vec<f64> = self.halves.iter().map(|(_, [a, b])| b - a - common).collect();
-        // Times less their place's mean.
-        let mut sums = vec![(0.0, 0.0); self.least.len()];
-        for (k, [a, b]) in &self.halves {
-            sums[*k] = (sums[*k].0 + a + b - common, sums[*k].1 + 2.0);
+    /// A row without verdict; `common` is taken off the logarithms of each part.
+    fn row(&self, name: &str, common: [f64; 3]) -> Row {
+        let changes: Vec<f64> =
+            self.places.iter().filter_map(|p| p[0]).map(|[a, b]| b - a - common[0]).collect();
+        let (mut differences, mut a_aligned, mut b_aligned) = (Vec::new(), Vec::new(), Vec::new());
+        for place in &self.places {
+            let halves: Vec<[f64; 2]> =
+                [1, 2].iter().filter_map(|k| place[*k].map(|[a, b]| [a, b - common[*k]])).collect();
+            let mean = halves.iter().flatten().sum::<f64>() / (2 * halves.len()) as f64;
+            for [a, b] in halves {
+                differences.push(b - a);
+                a_aligned.push(a - mean);
+                b_aligned.push(b - mean);
+            }
         }
-        let aligned = |which: usize| -> Vec<f64> {
-            let shift = if which == 1 { common } else { 0.0 };
-            self.halves.iter().map(|(k, p)| p[which] - shift - sums[*k].0 / sums[*k].1).collect()
-        };
         let [a_ms, b_ms] = self.mean_ms();
         Row {
             name: name.into(),
@@ -327,7 +326,7 @@ impl Pairs {
             b_ms,
             ratio: median(&changes).exp(),
             interval: block_bootstrap(&changes, 2, 0.95, median).map(f64::exp),
-            mann_whitney_p: mann_whitney(&aligned(0), &aligned(1)),
+            mann_whitney_p: mann_whitney(&a_aligned, &b_aligned),
             signed_rank_p: signed_rank(&differences),
             corrected_p: 1.0,
             least_ratio: f64::INFINITY,

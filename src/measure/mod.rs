@@ -6,6 +6,7 @@ pub mod host;
 pub mod pace;
 pub mod path;
 pub mod reflectance;
+pub mod report;
 pub mod results;
 pub mod statistics;
 pub mod trace;

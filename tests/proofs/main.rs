@@ -3,6 +3,7 @@
 //!
 //! Each prints its figures, and writes pictures, plots and tables to `target/tmp/proofs`.
 
+mod bench;
 mod cost;
 #[path = "../common/device.rs"]
 #[allow(dead_code)] // Each test program uses its own part of this module.
