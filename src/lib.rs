@@ -49,6 +49,9 @@
 //! | bakes on disk | [`bake::cache`], [`bake::tables`] | | `tests/cache.rs`, `tests/tables.rs` |
 //! | what a scene requires | [`plan`] | | `tests/gpu/plan.rs` |
 //! | the whole frame: extremes, the same bits again | [`frame`] | `frame/*` | `tests/gpu/extremes.rs`, `tests/gpu/determinism.rs` |
+//! | timestamps, statistics of the pipeline, CPU time a pass | [`gpu::Timing`], [`clock`] | | `tests/bench.rs`, `tests/proofs/bench.rs` |
+//! | benches along camera paths | [`measure::bench`], [`measure::path`], [`measure::results`], [`measure::trace`] | | `tests/bench.rs` |
+//! | what differs between two benches | [`measure::compare`], [`measure::statistics`] | | `tests/compare.rs`, `tests/proofs/bench.rs` |
 //! | the program | `src/cli/` | | `tests/cli.rs` |
 //!
 //! Structs and constants that Rust and GLSL share stand once, in `shaders/interface.glsl`; `build.rs` compiles and

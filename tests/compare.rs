@@ -134,7 +134,8 @@ fn the_ratio_is_that_of_the_pass() {
     let c = compare(run, &planted(run, "shadows", 1.08), false).unwrap();
     let row = c.rows.iter().find(|r| r.name == "shadows").unwrap();
     assert!((row.ratio - 1.08).abs() < 1e-9 && row.interval.iter().all(|i| (i - 1.08).abs() < 1e-9));
-    assert_eq!(changed(&c), [FRAME, "shadows"]);
+    // A quarter of the frame: 2 % of it, which is under what a frame may differ by.
+    assert_eq!(changed(&c), ["shadows"]);
     assert_eq!(c.slower_than(0.03).iter().map(|r| r.name.as_str()).collect::<Vec<_>>(), ["shadows"]);
     assert!(c.slower_than(0.09).is_empty());
     let faster = compare(&planted(run, "shadows", 1.08), run, false).unwrap();
@@ -154,9 +155,8 @@ fn what_all_passes_share_is_told_apart() {
     let c = compare(run, &slow, false).unwrap();
     assert_eq!(changed(&c), [COMMON]);
     assert_eq!(c.slower_than(0.03).len(), 1);
-    // Drawn in turn, the machine is the same for both: every pass counts as it is.
-    let turn = compare(run, &slow, true).unwrap();
-    assert!(changed(&turn).len() > 6 && changed(&turn).contains(&FRAME), "{:?}", changed(&turn));
+    // Drawn in turn, the machine is the same for both: every pass counts as it is, if it is enough of the frame.
+    assert_eq!(changed(&compare(run, &slow, true).unwrap()), [FRAME, "shadows", "terrain", "trees"]);
 }
 
 /// A device with its own clock is compared by that.

@@ -1,5 +1,8 @@
-//! README's table of knobs says what the program does.
+//! README's tables of knobs and of costs say what the program does, and what was measured.
 
+use canopy::measure::path::CameraPath;
+use canopy::measure::report::markdown;
+use canopy::measure::results::BenchResult;
 use canopy::settings::KNOBS;
 
 #[test]
@@ -13,4 +16,22 @@ fn the_table_of_knobs_is_that_of_the_settings() {
     }
     let readme = include_str!("../README.md");
     assert!(readme.contains(&table), "README.md must hold this table:\n\n{table}");
+}
+
+#[test]
+fn the_table_of_costs_is_that_of_the_results() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/results");
+    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    files.sort();
+    let results: Vec<BenchResult> = files.iter().map(|f| BenchResult::load(f).unwrap()).collect();
+    let table = markdown(&results);
+    assert!(include_str!("../README.md").contains(&table), "README.md must hold this table:\n\n{table}");
+}
+
+#[test]
+fn paths_are_named() {
+    let readme = include_str!("../README.md");
+    for (name, _) in CameraPath::BUILTIN {
+        assert!(readme.contains(&format!("`{name}`")), "{name}");
+    }
 }

@@ -210,7 +210,7 @@ fn report(args: &Args, results: &[BenchResult]) -> Result<()> {
 }
 
 fn write(file: &Path, text: &str) -> Result<()> {
-    std::fs::write(file, text).map_err(|e| Error::io(file, e))
+    canopy::image::write_whole(file, text.as_bytes())
 }
 
 /// The table.

@@ -28,6 +28,11 @@ pub const FRAME: &str = "frame";
 /// Row of what all passes have in common.
 pub const COMMON: &str = "all passes alike";
 
+/// Part of the frame from which a pass has a say in what is common.
+const COMMON_SHARE: f64 = 0.05;
+/// Passes that have a say at least, so that one that changed is outvoted.
+const COMMON_PASSES: usize = 3;
+
 /// What counts as a change.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Criteria {
@@ -51,7 +56,7 @@ impl Criteria {
         if cpu {
             Criteria { level, least_change: 0.02, least_frame: 0.03, least_share: 0.008, least_common: 0.10 }
         } else {
-            Criteria { level, least_change: 0.01, least_frame: 0.01, least_share: 0.001, least_common: 1e9 }
+            Criteria { level, least_change: 0.01, least_frame: 0.01, least_share: 0.001, least_common: 0.10 }
         }
     }
 }
@@ -193,20 +198,19 @@ pub fn compare(a: &BenchResult, b: &BenchResult, in_turn: bool) -> Result<Compar
     let passes: Vec<(String, Pairs)> =
         names.into_iter().filter_map(|n| pairs(&|f| time(f, &n, cpu)).map(|pairs| (n, pairs))).collect();
     let drift = cpu && !in_turn;
-    // The change of the median pass, by time, of all passes but one; in all rounds, and in each half of them.
-    let common = |except: Option<usize>| -> [f64; 3] {
-        let others = || passes.iter().enumerate().filter(|(k, _)| Some(*k) != except).map(|(_, (_, p))| p);
-        [0, 1, 2].map(|part| {
-            let mut all: Vec<(f64, f64)> =
-                others().filter_map(|p| Some((p.change(part)?, p.mean_ms()[0]))).collect();
-            all.sort_by(|x, y| x.0.total_cmp(&y.0));
-            if drift { weighted_median(&all) } else { 0.0 }
-        })
-    };
-    let mut rows = vec![frame.row(FRAME, common(None))];
-    rows.extend(passes.iter().enumerate().map(|(k, (name, pairs))| pairs.row(name, common(Some(k)))));
+    // The median change of the passes that matter, in all rounds and in each half of them. Short ones have noise of their own.
+    let mut longest: Vec<(&Pairs, f64)> = passes.iter().map(|(_, p)| (p, p.mean_ms()[0])).collect();
+    longest.sort_by(|x, y| y.1.total_cmp(&x.1));
+    let whole = frame.mean_ms()[0];
+    let enough = longest.iter().filter(|(_, ms)| *ms >= COMMON_SHARE * whole).count().max(COMMON_PASSES);
+    longest.truncate(enough);
+    let common = [0, 1, 2].map(|part| {
+        let changes: Vec<f64> = longest.iter().filter_map(|(p, _)| p.change(part)).collect();
+        if drift && !changes.is_empty() { median(&changes) } else { 0.0 }
+    });
+    let mut rows = vec![frame.row(FRAME, common)];
+    rows.extend(passes.iter().map(|(name, pairs)| pairs.row(name, common)));
     let corrected = holm(&rows.iter().map(|r| r.mann_whitney_p.max(r.signed_rank_p)).collect::<Vec<_>>());
-    let whole = rows[0].a_ms;
     for (row, p) in rows.iter_mut().zip(corrected) {
         row.corrected_p = p;
         let least = if row.name == FRAME { criteria.least_frame } else { criteria.least_change };
@@ -217,7 +221,7 @@ pub fn compare(a: &BenchResult, b: &BenchResult, in_turn: bool) -> Result<Compar
     }
     if drift {
         let mut row = frame.row(COMMON, [0.0; 3]);
-        let ratio = common(None)[0].exp();
+        let ratio = common[0].exp();
         row.interval = row.interval.map(|i| i / row.ratio * ratio);
         (row.ratio, row.corrected_p) = (ratio, row.mann_whitney_p.max(row.signed_rank_p));
         row.least_ratio = 1.0 + criteria.least_common;
@@ -347,17 +351,4 @@ impl Row {
             Verdict::NoDifference
         };
     }
-}
-
-/// Median of ascending values by their weights; 0 without any.
-fn weighted_median(sorted: &[(f64, f64)]) -> f64 {
-    let half = 0.5 * sorted.iter().map(|x| x.1).sum::<f64>();
-    let mut sum = 0.0;
-    for (value, weight) in sorted {
-        sum += weight;
-        if sum >= half {
-            return *value;
-        }
-    }
-    0.0
 }
