@@ -30,10 +30,9 @@ struct View {
     vec3 sun_direction;               // unit, towards the sun
     uint cascade_count;               // 0: no sun
     vec3 sun_irradiance;              // on a plane facing the sun, times the exposure scale
-    float range;                      // distance to which any tree is drawn one by one, m
+    float pixels_at_1m;               // pixels that one metre covers at one metre
     vec3 sky_radiance;                // mean over the upper hemisphere, times the exposure scale
     float camera_height;              // z of the camera in the terrain's system, m
-    float pixels_at_1m;               // pixels that one metre covers at one metre
     float footprint;                  // log2 of the pixel's size over the distance between pixels: 0 but for sparse images
     ivec2 grid_camera;                // camera's cell of the terrain's finest grid
     vec2 grid_offset;                 // camera's position in that cell, m

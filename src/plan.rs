@@ -291,8 +291,9 @@ impl Plan {
             let reach = species.mesh.positions.iter().map(|p| p[0].hypot(p[1]).max(p[2])).fold(0.0, f32::max);
             self.tallest = self.tallest.max(f64::from(reach) * scale);
         }
-        // The box of a tree is no wider than twice its reach. Mip 0 is used up to sqrt 2 texels a pixel; and views 10 degrees
-        // apart differ by less than a pixel under about eleven pixels: sin 10 degrees of half the size.
+        // The box of a tree is no wider than twice its reach. Filtered search is worth its price up to sqrt 2 texels a
+        // pixel; and views 10 degrees apart differ by less than a pixel under about eleven pixels: sin 10 degrees of
+        // half the size.
         let widest = 2.0 * self.tallest * eye.pixels_at_1m;
         let near = widest * std::f64::consts::SQRT_2 / f64::from(s.view_resolution);
         self.draw_limits = [near, widest / 11.0, (f64::from(s.convergence) * self.range).max(widest / 11.0)];

@@ -8,6 +8,7 @@
 #include "physics/light.glsl"
 #include "physics/tables.glsl"
 #include "physics/handover.glsl"
+#include "physics/shadow.glsl"
 #include "forest/cull.glsl"
 #include "forest/members.glsl"
 
@@ -106,9 +107,7 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     t.sky = tint * (kind.reflectance + kind.transmittance) * (0.25 * (1.0 + ground.z)) * v.sky_radiance;
     t.hole = density / (v.hole_radius * v.hole_radius);
     average_light(t, kind, to_camera, ground, density, converged(reach, v.convergence));
-    uint cascade = 0u;
-    for (uint c = 0u; c + 1u < v.cascade_count; c++) cascade += distance > v.cascade_far[c] ? 1u : 0u;
-    t.cascade = v.cascade_count == 0u || distance > v.cascade_far[v.cascade_count - 1u] ? MAX_CASCADES : cascade;
+    t.cascade = cascade_at(v.cascade_far, v.cascade_count, distance);
     return t;
 }
 

@@ -5,7 +5,8 @@
 float total_thickness(vec4 channels[COVER_GROUPS]) {
     float sum = -channels[0].x;
     for (uint g = 0u; g < COVER_GROUPS; g++) sum += dot(channels[g], vec4(1.0));
-    return sum;
+    // Filtering rounds.
+    return max(sum, 0.0);
 }
 
 // Discs overlap: at random they cover 1 - exp(-Lambda A), not Lambda A (BN12, section 4).

@@ -15,13 +15,6 @@ struct Cover {
     vec4 channels[COVER_GROUPS];      // coverage as stored, then density times mean area of each species
 };
 
-// Optical thickness of the crowns from above: sum of density times mean area.
-float total_thickness(Cover c) {
-    float sum = -c.channels[0].x;
-    for (uint g = 0u; g < COVER_LAYERS; g++) sum += dot(c.channels[g], vec4(1.0));
-    return max(sum, 0.0);
-}
-
 // The tile's level of detail follows the pixel's footprint. Where a quad morphs to its parent's shape the least level
 // rises to 1, where the parent's tile takes over at its level 0 with the same texels: nothing changes when quads do.
 Cover cover() {

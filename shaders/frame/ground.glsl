@@ -16,6 +16,7 @@ layout(binding = 4) uniform sampler2DArray albedo;
 layout(binding = 5) uniform sampler2DArray shadow_map;
 layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
 
+#include "forest/expected.glsl"
 #include "frame/cover.glsl"
 #include "physics/handover.glsl"
 layout(constant_id = 5) const bool HAS_SUN = true;
@@ -24,13 +25,13 @@ struct GroundLight {
     vec3 sun, sky;  // parts of the radiance
     float trees;    // share of the pixel that is trees of the shader-map
     vec4 fractions; // lit and shadowed ground, lit and shadowed trees
+    float coverage; // of the ground by discs of trees, from above
 };
 
 // How much of the sun the shadow maps leave.
 float shadow_maps(vec3 n, float cosine, float distance) {
-    uint c = 0u;
-    for (uint k = 0u; k + 1u < view.v.cascade_count; k++) c += distance > view.v.cascade_far[k] ? 1u : 0u;
-    if (view.v.cascade_count == 0u || distance > view.v.cascade_far[view.v.cascade_count - 1u]) return 1.0;
+    uint c = cascade_at(view.v.cascade_far, view.v.cascade_count, distance);
+    if (c == MAX_CASCADES) return 1.0;
     // Ground that curves within a texel would shade itself: half a texel towards the sun, more where the sun grazes.
     float texel = view.v.cascade_texel[c];
     vec3 from = position + n * (texel * sqrt(1.0 - cosine * cosine)) + view.v.sun_direction * (0.5 * texel);
@@ -51,17 +52,17 @@ GroundLight ground_light() {
     float cosine = max(dot(n, view.v.sun_direction), 0.0);
     Cover c = cover();
     // What the nodes know per thickness, times the pixel's own.
-    float thickness = total_thickness(c);
+    float thickness = total_thickness(c.channels);
     float expected = 1.0 - exp(-thickness * vertical.y);
     // Interpolation rounds beyond the values at the vertices.
     float nu = thickness > 0.0 ? clamp(tree_sky.w, 0.0, 1.0) : 0.0, trees_lit = clamp(tree_sun.w, 0.0, 1.0);
     float ground_lit = exp(thickness * min(paths.y - paths.z, 0.0));
-    float coverage = mix(expected, c.channels[0].x, c.resolved);
-    float lit = HAS_SUN ? mix(shadow_maps(n, cosine, distance), ground_lit, nu) : 0.0;
-    float contrast = mix(ground_contrast(coverage, expected, view.v.ground_contrast),
-                         ground_contrast(paths.w, expected, view.v.ground_contrast), nu);
-    float open = open_ground(thickness * paths.x, paths.x / max(paths.y, 1e-9), coverage, expected);
     GroundLight g;
+    g.coverage = mix(expected, c.channels[0].x, c.resolved);
+    float lit = HAS_SUN ? mix(shadow_maps(n, cosine, distance), ground_lit, nu) : 0.0;
+    float contrast = mix(ground_contrast(g.coverage, expected, view.v.ground_contrast),
+                         ground_contrast(paths.w, expected, view.v.ground_contrast), nu);
+    float open = open_ground(thickness * paths.x, paths.x / max(paths.y, 1e-9), g.coverage, expected);
     vec3 sun = reflectance * (cosine * lit / PI) * view.v.sun_irradiance;
     vec3 sky = reflectance * (0.5 * (1.0 + n.z) * exp(-thickness * vertical.x) * contrast) * view.v.sky_radiance;
     g.sun = mix(max(tree_sun.rgb, 0.0), sun, open);

@@ -11,22 +11,17 @@ void main() {
     GroundLight g = ground_light();
     vec3 n = ground_normal();
     float distance = length(position);
-    uint cascade = 0u;
-    for (uint k = 0u; k < view.v.cascade_count; k++) cascade += distance > view.v.cascade_far[k] ? 1u : 0u;
-    Cover c = cover();
     vec3 shown = 0.5 + 0.5 * n;
     if (VIEW_MODE == MODE_FRACTIONS) shown = fractions_colour(g.fractions);
-    if (VIEW_MODE == MODE_COVERAGE) {
-        float expected = 1.0 - exp(-total_thickness(c) * vertical.y);
-        shown = mix(vec3(0.3, 0.2, 0.1), vec3(0.1, 0.6, 0.15), mix(expected, c.channels[0].x, c.resolved));
-    }
+    if (VIEW_MODE == MODE_COVERAGE) shown = mix(vec3(0.3, 0.2, 0.1), vec3(0.1, 0.6, 0.15), g.coverage);
     if (VIEW_MODE == MODE_LOD) {
         // A hue a power of two of texel size; grey where discs are not told apart; dark where trees stand for themselves.
+        Cover c = cover();
         float size = log2(c.texel);
         shown = mix(vec3(0.5), hue_colour(size / 6.0), c.resolved) * (0.3 + 0.7 * paths.x / max(paths.y, 1e-9));
     }
     if (VIEW_MODE == MODE_CASCADES) {
-        shown = cascade_colour(cascade < view.v.cascade_count ? cascade : MAX_CASCADES,
+        shown = cascade_colour(cascade_at(view.v.cascade_far, view.v.cascade_count, distance),
                                shadow_maps(n, max(dot(n, view.v.sun_direction), 0.0), distance));
     }
     colour = vec4(shown, 1.0);

@@ -6,6 +6,13 @@ vec2 plane_gradient(vec3 n, vec3 x, vec3 y, vec3 sun) {
     return clamp(vec2(dot(n, x), dot(n, y)) * (-0.5 / max(dot(n, sun), 1e-3)), -2.0, 2.0);
 }
 
+// The cascade for a distance, given how far each of `count` is used: MAX_CASCADES beyond the last, and without any.
+uint cascade_at(vec4 far, uint count, float distance) {
+    uint nearer = 0u;
+    for (uint k = 0u; k < count; k++) nearer += distance > far[k] ? 1u : 0u;
+    return nearer < count ? nearer : MAX_CASCADES;
+}
+
 // Which of four casters leave the sun to points at the depths.
 vec4 caster_visibility(vec4 casters, vec4 depths) { return vec4(lessThanEqual(casters, depths)); }
 

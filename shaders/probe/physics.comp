@@ -2,6 +2,7 @@
 // Words are bits: floats go through uintBitsToFloat, so that integers pass unharmed.
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#include "interface.glsl"
 #include "physics/hash.glsl"
 #include "physics/views.glsl"
 #include "physics/light.glsl"

@@ -45,19 +45,11 @@ pub fn pattern_density(scene: &Scene) -> f64 {
 
 /// What the tables of a scene's species are measured with.
 pub fn forest_settings(scene: &Scene, species: usize) -> ForestSettings {
-    let (s, kind) = (&scene.settings, &scene.species[species]);
-    ForestSettings {
-        angles: s.table_angles,
-        densities: s.table_densities,
-        rays: s.table_rays,
-        // A scene without trees still has species: any density will do.
-        pattern_density: Some(pattern_density(scene)).filter(|d| *d > 0.0).unwrap_or(0.01),
-        scale_range: kind.scale,
-        poisson: matches!(kind.distribution, Distribution::Positions(_)),
-        hole_radius: s.hole_radius,
-        light_iterations: s.light_iterations,
-        view_iterations: s.view_iterations,
-    }
+    let kind = &scene.species[species];
+    // A scene without trees still has species: any density will do.
+    let density = Some(pattern_density(scene)).filter(|d| *d > 0.0).unwrap_or(0.01);
+    let poisson = matches!(kind.distribution, Distribution::Positions(_));
+    ForestSettings::new(&scene.settings, density, kind.scale, poisson)
 }
 
 /// Everything that drawing a scene's trees needs, from the cache in `dir` where it is there.

@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
+use canopy::gpu::{Gpu, GpuOptions};
 use canopy::scene::{Camera, Scene};
 use canopy::settings::{KNOBS, PRESETS, Settings};
 use canopy::{Error, Result};
-use clap::builder::PossibleValuesParser;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 /// Which scene, from where, how large and how well.
 #[derive(clap::Args)]
@@ -63,6 +64,40 @@ impl QualityOptions {
         self.set(&mut settings)?;
         Ok(settings)
     }
+}
+
+/// On which device, and watched or not.
+#[derive(clap::Args)]
+pub struct DeviceOptions {
+    /// Device by UUID or part of its name; left out: the best that fits (see `canopy devices`)
+    #[arg(long, value_name = "UUID|NAME")]
+    pub device: Option<String>,
+    /// Watch with the Vulkan validation layers; any message makes the exit code 4
+    #[arg(long)]
+    pub validate: bool,
+}
+
+impl DeviceOptions {
+    /// Opens the device, works with it and closes it. What the validation layers say comes first: it may be why the work
+    /// failed.
+    pub fn with<T>(&self, work: impl FnOnce(&Gpu) -> Result<T>) -> Result<T> {
+        let gpu = Gpu::new(&GpuOptions { device: self.device.clone(), validate: self.validate })?;
+        let done = work(&gpu);
+        match (gpu.close(), done) {
+            (Err(e @ Error::Validation(_)), _) | (_, Err(e)) | (Err(e), Ok(_)) => Err(e),
+            (Ok(()), Ok(value)) => Ok(value),
+        }
+    }
+}
+
+/// A parser of one of the names in a table, to its value.
+pub fn named<T: Copy + Send + Sync + 'static, const N: usize>(
+    names: [(&'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(names.map(|n| n.0)).map(move |name| {
+        // The parser lets only these through.
+        names.iter().find(|n| n.0 == name).unwrap_or(&names[0]).1
+    })
 }
 
 /// What to print.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use canopy::bake::{cache, load_or_bake_scene};
-use canopy::gpu::{Gpu, GpuOptions};
+use canopy::gpu::Gpu;
 use canopy::measure::reflectance::{Measured, Method, Request, mean_densities, measure};
 use canopy::plan::Representation;
 use canopy::progress::Progress;
@@ -11,7 +11,7 @@ use canopy::scene::Scene;
 use canopy::{Error, Result};
 
 use super::SCHEMA_VERSION;
-use super::options::{PrintOptions, SceneOptions, knobs_help};
+use super::options::{DeviceOptions, PrintOptions, SceneOptions, knobs_help, named};
 use super::output;
 
 const EXAMPLES: &str = "\
@@ -71,7 +71,7 @@ pub struct Args {
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = list)]
     slope: List,
     /// How trees are drawn: auto, zfield, shader-map; or several with commas between
-    #[arg(long, value_name = "NAMES", default_value = "auto", value_delimiter = ',', value_parser = representation)]
+    #[arg(long, value_name = "NAMES", default_value = "auto", value_delimiter = ',', value_parser = named(Representation::NAMES))]
     representation: Vec<Representation>,
     /// Trees per m² of all species together, instead of the scene's mean
     #[arg(long, value_name = "TREES/M2", allow_negative_numbers = true)]
@@ -88,12 +88,8 @@ pub struct Args {
     /// CSV to write; left out: the standard output
     #[arg(short, long, value_name = "FILE.csv")]
     out: Option<PathBuf>,
-    /// Device by UUID or part of its name; left out: the best that fits (see `canopy devices`)
-    #[arg(long, value_name = "UUID|NAME")]
-    device: Option<String>,
-    /// Watch with the Vulkan validation layers; any message makes the exit code 4
-    #[arg(long)]
-    validate: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
     #[command(flatten)]
     print: PrintOptions,
 }
@@ -137,14 +133,7 @@ pub fn run(args: &Args) -> Result<()> {
     if densities.iter().sum::<f64>() <= 0.0 {
         return Err(Error::Usage("the scene has no trees to measure".into()));
     }
-    let gpu = Gpu::new(&GpuOptions { device: args.device.clone(), validate: args.validate })?;
-    let rows = all(args, &gpu, &scene, &camera, &densities);
-    // What the validation layers say comes first: it may be why the measurement failed.
-    let rows = match (gpu.close(), rows) {
-        (Err(e @ Error::Validation(_)), _) | (Ok(()), Err(e)) | (Err(e), Ok(_)) => return Err(e),
-        (Err(_), Err(e)) => return Err(e),
-        (Ok(()), Ok(rows)) => rows,
-    };
+    let rows = args.device.with(|gpu| all(args, gpu, &scene, &camera, &densities))?;
     let text = csv(&rows);
     if let Some(out) = &args.out {
         canopy::image::write_whole(out, text.as_bytes())?;
@@ -288,9 +277,4 @@ fn list(text: &str) -> std::result::Result<List, String> {
         }
     }
     Ok(List(all))
-}
-
-fn representation(text: &str) -> std::result::Result<Representation, String> {
-    let found = Representation::NAMES.iter().find(|(name, _)| *name == text.trim());
-    found.map(|(_, r)| *r).ok_or_else(|| "write auto, zfield or shader-map".into())
 }

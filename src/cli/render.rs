@@ -7,16 +7,15 @@ use std::time::Instant;
 use canopy::bake::{Baked, cache, load_or_bake_scene};
 use canopy::frame::camera::Eye;
 use canopy::frame::{FrameReport, Renderer, auto_exposure};
-use canopy::gpu::{DeviceInfo, Gpu, GpuOptions, PassTime};
+use canopy::gpu::{DeviceInfo, Gpu, PassTime};
 use canopy::plan::{Plan, Representation, ViewMode};
 use canopy::progress::Progress;
 use canopy::scene::{Camera, Scene};
 use canopy::settings::Settings;
 use canopy::{Error, Result};
-use clap::builder::PossibleValuesParser;
 
 use super::SCHEMA_VERSION;
-use super::options::{PrintOptions, SceneOptions, knobs_help};
+use super::options::{DeviceOptions, PrintOptions, SceneOptions, knobs_help, named};
 use super::output::{self, Table};
 
 const EXAMPLES: &str = "\
@@ -42,23 +41,19 @@ pub struct Args {
     exr: Option<PathBuf>,
     /// Draw what the renderer decides instead of light: fractions (lit and shadowed ground, lit and shadowed trees), coverage,
     /// lod, cascades, normals
-    #[arg(long, value_name = "MODE", default_value = "radiance", value_parser = PossibleValuesParser::new(ViewMode::NAMES.map(|m| m.0)))]
-    view_mode: String,
+    #[arg(long, value_name = "MODE", default_value = "radiance", value_parser = named(ViewMode::NAMES))]
+    view_mode: ViewMode,
     /// How trees are drawn: auto, zfield or shader-map at any distance
-    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = PossibleValuesParser::new(Representation::NAMES.map(|m| m.0)))]
-    representation: String,
+    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = named(Representation::NAMES))]
+    representation: Representation,
     /// Stops brighter (or, negative, darker) than the automatic exposure
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = stops)]
     exposure: f64,
     /// Frames to draw. The first one also fills the caches; times of passes are the last one's
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
-    /// Device by UUID or part of its name; left out: the best that fits (see `canopy devices`)
-    #[arg(long, value_name = "UUID|NAME")]
-    device: Option<String>,
-    /// Watch with the Vulkan validation layers; any message makes the exit code 4
-    #[arg(long)]
-    validate: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
     #[command(flatten)]
     print: PrintOptions,
 }
@@ -149,7 +144,7 @@ struct Report<'a> {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    if args.exr.is_some() && args.view_mode != "radiance" {
+    if args.exr.is_some() && args.view_mode != ViewMode::Radiance {
         return Err(Error::Usage("--exr holds radiance: leave out --view-mode".into()));
     }
     if let Some(png) = &args.output {
@@ -168,14 +163,7 @@ pub fn run(args: &Args) -> Result<()> {
     });
     output::check(&png, "png")?;
     let load_s = start.elapsed().as_secs_f64();
-    let gpu = Gpu::new(&GpuOptions { device: args.device.clone(), validate: args.validate })?;
-    let drawn = draw(args, &gpu, scene, &camera, png, load_s);
-    // What the validation layers say comes first: it may be why the drawing failed.
-    match (gpu.close(), drawn) {
-        (Err(e @ Error::Validation(_)), _) | (Ok(()), Err(e)) | (Err(e), Ok(())) => Err(e),
-        (Err(_), Err(e)) => Err(e),
-        (Ok(()), Ok(())) => Ok(()),
-    }
+    args.device.with(|gpu| draw(args, gpu, scene, &camera, png, load_s))
 }
 
 fn stops(text: &str) -> std::result::Result<f64, String> {
@@ -188,13 +176,9 @@ fn stops(text: &str) -> std::result::Result<f64, String> {
 /// Everything between opening and closing the device.
 fn draw(args: &Args, gpu: &Gpu, scene: Scene, camera: &Camera, png: PathBuf, load_s: f64) -> Result<()> {
     let quiet = args.print.quiet;
-    let named =
-        |all: &[(&str, Representation)]| all.iter().find(|(n, _)| *n == args.representation).map(|(_, r)| *r);
-    let representation = named(&Representation::NAMES).unwrap_or_default();
     let eye = Eye::new(camera, &scene.terrain, args.scene.size);
-    let mut plan = Plan::for_eye(&scene, &eye, args.exr.is_some(), representation, Some(gpu.info()))?;
-    let mode = ViewMode::NAMES.iter().find(|(name, _)| *name == args.view_mode);
-    plan.view_mode = mode.map_or(ViewMode::Radiance, |(_, mode)| *mode);
+    let mut plan = Plan::for_eye(&scene, &eye, args.exr.is_some(), args.representation, Some(gpu.info()))?;
+    plan.view_mode = args.view_mode;
     let scene = Arc::new(scene);
     let start = Instant::now();
     let (mut baked, mut states): (Vec<Baked>, Vec<Bake>) = (Vec::new(), Vec::new());
@@ -259,7 +243,7 @@ fn draw(args: &Args, gpu: &Gpu, scene: Scene, camera: &Camera, png: PathBuf, loa
             allocations,
         },
         timings: Timings { load_s, bake_s, build_s, frames_s, write_s },
-        validation: Validation { enabled: args.validate, messages: gpu.messages() },
+        validation: Validation { enabled: args.device.validate, messages: gpu.messages() },
         outputs: Outputs {
             png: png.display().to_string(),
             exr: args.exr.as_ref().map(|p| p.display().to_string()),

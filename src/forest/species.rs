@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::density::{HEIGHT_SOFTNESS, SLOPE_SOFTNESS};
 use super::listed;
-use crate::bake::{Baked, ZField};
+use crate::bake::{Baked, ZField, tables};
 use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
 use crate::physics::masks::combination_table;
@@ -170,10 +170,9 @@ pub(crate) fn density_map_size(species: &Species, extent: [f64; 2]) -> Option<[u
     }
 }
 
-/// Mean of the squared scale of a species' trees: (a² + ab + b²) / 3 where it is drawn evenly from `[a, b]`.
+/// Mean of the squared scale of a species' trees.
 fn mean_squared_scale(species: &Species) -> f64 {
-    let [a, b] = species.scale.map(f64::from);
-    let drawn = (a * a + a * b + b * b) / 3.0;
+    let drawn = tables::mean_squared_scale(species.scale);
     match &species.distribution {
         Distribution::Positions(list) if !list.is_empty() => {
             let square = |p: &TreePosition| p.scale.map_or(drawn, |s| f64::from(s).powi(2));

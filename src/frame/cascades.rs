@@ -60,9 +60,7 @@ impl Cascade {
         columns[3][3] = 1.0;
         columns
     }
-}
 
-impl Cascade {
     /// A cascade around a point relative to the eye, snapped to whole texels.
     pub fn around(sun: [f64; 3], eye: &Eye, target: [f64; 3], half: f64, texel: f64, far: f64) -> Self {
         let across = cross([0.0, 0.0, 1.0], sun);

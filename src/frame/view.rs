@@ -125,6 +125,5 @@ pub fn view(
     view.silhouette_step = plan.tallest as f32;
     view.height_cell = scene.terrain.cell_size as f32;
     view.cells_per_metre = (1.0 / scene.terrain.cell_size) as f32;
-    view.range = plan.range.max(1.0) as f32;
     view
 }

@@ -121,10 +121,14 @@ pub struct ForestTables {
 }
 
 /// Mean horizontal area of a species' trees, m²: A = π `crown_radius`² E(scale²).
-pub fn mean_area(shape: &Shape, [low, high]: [f32; 2]) -> f64 {
-    let (low, high) = (f64::from(low), f64::from(high));
-    let squares = (low * low + low * high + high * high) / 3.0;
-    std::f64::consts::PI * f64::from(shape.crown_radius).powi(2) * squares
+pub fn mean_area(shape: &Shape, scale_range: [f32; 2]) -> f64 {
+    std::f64::consts::PI * f64::from(shape.crown_radius).powi(2) * mean_squared_scale(scale_range)
+}
+
+/// E(scale²) of scales drawn evenly from a range: (a² + ab + b²) / 3.
+pub fn mean_squared_scale(range: [f32; 2]) -> f64 {
+    let [a, b] = range.map(f64::from);
+    (a * a + a * b + b * b) / 3.0
 }
 
 /// Refuses settings that nothing can be measured with.
