@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use canopy::bake::{Baked, cache, load_or_bake_scene};
 use canopy::frame::Renderer;
-use canopy::gpu::{Gpu, GpuOptions, TimingOptions};
+use canopy::gpu::{Gpu, TimingOptions};
 use canopy::measure::bench::{Request, Subject, plan, run as measure};
 use canopy::measure::compare::{Comparison, compare};
 use canopy::measure::path::CameraPath;
@@ -15,9 +15,10 @@ use canopy::measure::report::markdown;
 use canopy::measure::results::{BenchResult, Cold};
 use canopy::measure::trace::trace;
 use canopy::scene::Scene;
+use canopy::settings::Settings;
 use canopy::{Error, Result};
 
-use super::options::{PrintOptions, SceneOptions, assignment, knobs_help};
+use super::options::{DeviceOptions, PrintOptions, SceneOptions, assignment, knobs_help};
 use super::output::{self, Table};
 
 const EXAMPLES: &str = "\
@@ -80,9 +81,8 @@ pub struct Args {
     /// Print a table in Markdown instead
     #[arg(long, conflicts_with = "json")]
     markdown: bool,
-    /// Device by UUID or part of its name; left out: the best that fits (see `canopy devices`)
-    #[arg(long, value_name = "UUID|NAME")]
-    device: Option<String>,
+    #[command(flatten)]
+    device: DeviceOptions,
     #[command(flatten)]
     print: PrintOptions,
 }
@@ -126,7 +126,22 @@ pub fn run(args: &Args) -> Result<()> {
         args.against.iter().try_for_each(|(name, value)| other.set(name, *value))?;
         settings.push(other);
     }
-    let gpu = Gpu::new(&GpuOptions { device: args.device.clone(), validate: false })?;
+    let results = args.device.with(|gpu| bench(args, gpu, &scene, settings, path, load_s))?;
+    report(args, &results)
+}
+
+/// Everything between opening and closing the device.
+fn bench(
+    args: &Args,
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: Vec<Settings>,
+    path: CameraPath,
+    load_s: f64,
+) -> Result<Vec<BenchResult>> {
+    if args.pipeline_statistics && !gpu.info().pipeline_statistics {
+        return Err(Error::NoDevice(format!("{} has no pipeline statistics", gpu.info().name)));
+    }
     let software = gpu.info().kind == "cpu";
     let request = Request {
         path,
@@ -139,16 +154,11 @@ pub fn run(args: &Args) -> Result<()> {
             statistics: args.pipeline_statistics,
         },
         pace: software,
+        validate: args.device.validate,
     };
-    if args.pipeline_statistics && !gpu.info().pipeline_statistics {
-        return Err(Error::NoDevice(format!("{} has no pipeline statistics", gpu.info().name)));
-    }
-    let subject = |settings| build(args, &gpu, Scene { settings, ..scene.clone() }, &request, load_s);
+    let subject = |settings| build(args, gpu, Scene { settings, ..scene.clone() }, &request, load_s);
     let mut subjects = settings.into_iter().map(subject).collect::<Result<Vec<_>>>()?;
-    let results = measure(&gpu, &mut subjects, &request, args.print.quiet)?;
-    drop(subjects);
-    gpu.close()?;
-    report(args, &results)
+    measure(gpu, &mut subjects, &request, args.print.quiet)
 }
 
 /// Bakes and builds one setting.

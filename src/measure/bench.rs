@@ -34,6 +34,8 @@ pub struct Request {
     pub timing: TimingOptions,
     /// The fixed work before every frame too.
     pub pace: bool,
+    /// The device is watched by the validation layers; for the report only.
+    pub validate: bool,
 }
 
 /// One setting to measure.
@@ -107,7 +109,7 @@ pub fn run(gpu: &Gpu, subjects: &mut [Subject], request: &Request, quiet: bool) 
         }
     }
     progress.finish();
-    let host = Host::here(&gpu.info().name, false);
+    let host = Host::here(&gpu.info().name, request.validate);
     let finished = subjects.iter().zip(frames).map(|(s, f)| result(gpu, s, f, request, views.len(), &host));
     Ok(finished.collect())
 }
