@@ -54,6 +54,10 @@ fn json(folder: &Path, args: &[&str]) -> Value {
 fn keys(value: &Value, path: &str, found: &mut BTreeSet<String>) {
     let named = ["settings", "assets", "bake_cache", "heaps", "allocations", "variables", "metrics"];
     match value {
+        // A table that happens to be empty here is one all the same.
+        Value::Object(all) if all.is_empty() => {
+            found.insert(format!("{}.*", path.trim_start_matches('.')));
+        }
         Value::Object(all) => {
             for (k, v) in all {
                 let k = if named.iter().any(|n| path.ends_with(n)) { "*" } else { k };

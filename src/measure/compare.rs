@@ -5,8 +5,7 @@
 //!
 //! * **Views are blocks.** Frame k of both results shows the same view, so only times of the same view are compared; the first
 //!   round, whose caches are colder, is left out where there are later ones.
-//! * **The least of several rounds** stands for a view; for the tests, of each half of the rounds, so that a view gives two
-//!   differences.
+//! * **The least of several rounds** stands for a view. Only the views are samples then, and a path should have a dozen or more.
 //! * **What all passes have in common** is the machine, not a pass: on software drivers, whose two results come one after the
 //!   other, the median pass (by time) is taken off every pass, and listed apart. Results drawn in turn, and times of a
 //!   GPU's own clock, are compared as they are.
@@ -54,7 +53,7 @@ impl Criteria {
     pub fn new(cpu: bool) -> Self {
         let level = 0.05;
         if cpu {
-            Criteria { level, least_change: 0.02, least_frame: 0.03, least_share: 0.008, least_common: 0.10 }
+            Criteria { level, least_change: 0.02, least_frame: 0.03, least_share: 0.007, least_common: 0.10 }
         } else {
             Criteria { level, least_change: 0.01, least_frame: 0.01, least_share: 0.001, least_common: 0.10 }
         }
@@ -198,16 +197,14 @@ pub fn compare(a: &BenchResult, b: &BenchResult, in_turn: bool) -> Result<Compar
     let passes: Vec<(String, Pairs)> =
         names.into_iter().filter_map(|n| pairs(&|f| time(f, &n, cpu)).map(|pairs| (n, pairs))).collect();
     let drift = cpu && !in_turn;
-    // The median change of the passes that matter, in all rounds and in each half of them. Short ones have noise of their own.
-    let mut longest: Vec<(&Pairs, f64)> = passes.iter().map(|(_, p)| (p, p.mean_ms()[0])).collect();
-    longest.sort_by(|x, y| y.1.total_cmp(&x.1));
+    // The median change of the passes that matter: short ones have noise of their own.
+    let mut longest: Vec<(f64, f64)> = passes.iter().map(|(_, p)| (p.mean_ms()[0], p.change())).collect();
+    longest.sort_by(|x, y| y.0.total_cmp(&x.0));
     let whole = frame.mean_ms()[0];
-    let enough = longest.iter().filter(|(_, ms)| *ms >= COMMON_SHARE * whole).count().max(COMMON_PASSES);
+    let enough = longest.iter().filter(|(ms, _)| *ms >= COMMON_SHARE * whole).count().max(COMMON_PASSES);
     longest.truncate(enough);
-    let common = [0, 1, 2].map(|part| {
-        let changes: Vec<f64> = longest.iter().filter_map(|(p, _)| p.change(part)).collect();
-        if drift && !changes.is_empty() { median(&changes) } else { 0.0 }
-    });
+    let changes: Vec<f64> = longest.iter().map(|(_, change)| *change).collect();
+    let common = if drift && !changes.is_empty() { median(&changes) } else { 0.0 };
     let mut rows = vec![frame.row(FRAME, common)];
     rows.extend(passes.iter().map(|(name, pairs)| pairs.row(name, common)));
     let corrected = holm(&rows.iter().map(|r| r.mann_whitney_p.max(r.signed_rank_p)).collect::<Vec<_>>());
@@ -220,23 +217,23 @@ pub fn compare(a: &BenchResult, b: &BenchResult, in_turn: bool) -> Result<Compar
         row.judge(criteria.level);
     }
     if drift {
-        let mut row = frame.row(COMMON, [0.0; 3]);
-        let ratio = common[0].exp();
+        let mut row = frame.row(COMMON, 0.0);
+        let ratio = common.exp();
         row.interval = row.interval.map(|i| i / row.ratio * ratio);
         (row.ratio, row.corrected_p) = (ratio, row.mann_whitney_p.max(row.signed_rank_p));
         row.least_ratio = 1.0 + criteria.least_common;
         row.judge(criteria.level);
         rows.insert(1, row);
     }
-    let pace = pairs(&|f| f.pace_ms).and_then(|p| p.change(0));
+    let pace = pairs(&|f| f.pace_ms).map(|p| p.change().exp());
     Ok(Comparison {
         schema_version: COMPARE_SCHEMA_VERSION,
         command: "compare".into(),
         quantity: if cpu { "cpu_ms" } else { "gpu_ms" },
         in_turn,
         criteria,
-        views: frame.places.len() as u32,
-        pace_ratio: pace.map(f64::exp),
+        views: frame.0.len() as u32,
+        pace_ratio: pace,
         differences: differences(a, b),
         rows,
     })
@@ -273,56 +270,37 @@ fn least(times: &[f64]) -> f64 {
     times.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-/// Times of A and B of the same places, logarithms of ms: the least of all rounds, of the first half of them, if there are
-/// two or more, and of the second.
-struct Pairs {
-    places: Vec<[Option<[f64; 2]>; 3]>,
-}
+/// Times of A and B of the same places, logarithms of ms: the least of all rounds.
+struct Pairs(Vec<[f64; 2]>);
 
 impl Pairs {
     /// `None` if there is no place with times in both.
     fn new(a: &Times, b: &Times) -> Option<Self> {
         let both = a.iter().filter_map(|(place, x)| Some((x, b.get(place)?)));
-        let places: Vec<_> = both
-            .map(|(x, y)| {
-                // The same number of rounds of each: the least of more would be less.
-                let n = x.len().min(y.len());
-                let half = n / 2;
-                let of =
-                    |from: usize, to: usize| (to > from).then(|| [least(&x[from..to]), least(&y[from..to])]);
-                [of(0, n), of(0, half), of(half, n)]
-            })
-            .collect();
-        (!places.is_empty()).then_some(Pairs { places })
+        // The same number of rounds of each: the least of more would be less.
+        let pairs = both.map(|(x, y)| {
+            let n = x.len().min(y.len());
+            [least(&x[..n]), least(&y[..n])]
+        });
+        let pairs: Vec<_> = pairs.collect();
+        (!pairs.is_empty()).then_some(Pairs(pairs))
     }
 
-    /// Logarithm of B over A in the middle, in all rounds (0) or in a half of them (1, 2).
-    fn change(&self, part: usize) -> Option<f64> {
-        let all: Vec<f64> = self.places.iter().filter_map(|p| p[part]).map(|[a, b]| b - a).collect();
-        (!all.is_empty()).then(|| median(&all))
+    /// Logarithm of B over A in the middle.
+    fn change(&self) -> f64 {
+        median(&self.0.iter().map(|[a, b]| b - a).collect::<Vec<_>>())
     }
 
     /// Means of the least times, ms.
     fn mean_ms(&self) -> [f64; 2] {
-        let all: Vec<[f64; 2]> = self.places.iter().filter_map(|p| p[0]).collect();
-        [0, 1].map(|k| all.iter().map(|p| p[k].exp()).sum::<f64>() / all.len() as f64)
+        [0, 1].map(|k| self.0.iter().map(|p| p[k].exp()).sum::<f64>() / self.0.len() as f64)
     }
 
-    /// A row without verdict; `common` is taken off the logarithms of each part.
-    fn row(&self, name: &str, common: [f64; 3]) -> Row {
-        let changes: Vec<f64> =
-            self.places.iter().filter_map(|p| p[0]).map(|[a, b]| b - a - common[0]).collect();
-        let (mut differences, mut a_aligned, mut b_aligned) = (Vec::new(), Vec::new(), Vec::new());
-        for place in &self.places {
-            let halves: Vec<[f64; 2]> =
-                [1, 2].iter().filter_map(|k| place[*k].map(|[a, b]| [a, b - common[*k]])).collect();
-            let mean = halves.iter().flatten().sum::<f64>() / (2 * halves.len()) as f64;
-            for [a, b] in halves {
-                differences.push(b - a);
-                a_aligned.push(a - mean);
-                b_aligned.push(b - mean);
-            }
-        }
+    /// A row without verdict; `common` is taken off the logarithms.
+    fn row(&self, name: &str, common: f64) -> Row {
+        let changes: Vec<f64> = self.0.iter().map(|[a, b]| b - a - common).collect();
+        // Less the mean of the view, each is half the change away.
+        let aligned = |side: f64| changes.iter().map(|c| side * c).collect::<Vec<_>>();
         let [a_ms, b_ms] = self.mean_ms();
         Row {
             name: name.into(),
@@ -330,8 +308,8 @@ impl Pairs {
             b_ms,
             ratio: median(&changes).exp(),
             interval: block_bootstrap(&changes, 2, 0.95, median).map(f64::exp),
-            mann_whitney_p: mann_whitney(&a_aligned, &b_aligned),
-            signed_rank_p: signed_rank(&differences),
+            mann_whitney_p: mann_whitney(&aligned(-0.5), &aligned(0.5)),
+            signed_rank_p: signed_rank(&changes),
             corrected_p: 1.0,
             least_ratio: f64::INFINITY,
             verdict: Verdict::NoDifference,
