@@ -108,26 +108,21 @@ fn names_of_the_json_and_csv_stay() {
     assert_eq!(vertices, 6 * frame["trees_zfield"].as_u64().unwrap());
 }
 
-/// One submission a frame, as on hardware. The passes are all that the frame does: what is missing of its time is stamps and barriers.
+/// One submission a frame, as on hardware, and one a pass. How nearly the passes add up to their frame is a proof's to say
+/// (`tests/proofs/bench.rs`): here, that they are no more than it.
 #[test]
 fn passes_add_up_follow_their_submission_and_do_not_overlap() {
     let dir = tempfile::tempdir().unwrap();
     for together in [&["--together"][..], &[]] {
         let args = ["--frames", "8", "--step", "1", "--trace", "t.json"];
         let result = json(dir.path(), &[&args, together].concat());
-        let (mut sum, mut whole) = (0.0, 0.0);
         for f in result["frames"].as_array().unwrap() {
             assert_eq!(f["lost_stamps"], 0);
             let passes = f["passes"].as_array().unwrap();
-            sum += passes.iter().map(|p| p["gpu_ms"].as_f64().unwrap()).sum::<f64>();
-            whole += f["gpu_ms"].as_f64().unwrap();
+            let sum: f64 = passes.iter().map(|p| p["gpu_ms"].as_f64().unwrap()).sum();
+            assert!(sum > 0.0 && sum <= f["gpu_ms"].as_f64().unwrap() + 1e-6);
             assert!(f["cpu_ms"].as_f64().unwrap() > 0.0);
         }
-        // With a submission for each pass, the time between them is in the frame's but in no pass's.
-        if !together.is_empty() {
-            assert!((sum / whole - 1.0).abs() < 0.03, "passes take {sum} ms, frames {whole} ms");
-        }
-        assert!(sum <= whole);
         let trace: Value =
             serde_json::from_str(&std::fs::read_to_string(dir.path().join("t.json")).unwrap()).unwrap();
         check_trace(&trace, &result);
