@@ -110,7 +110,7 @@ pub fn run(args: &Args) -> Result<()> {
     for json in [&args.trace, &args.bmf, &args.output].into_iter().flatten() {
         output::check(json, "json")?;
     }
-    if !(args.duration > 0.0) {
+    if args.duration.is_nan() || args.duration <= 0.0 {
         return Err(Error::Usage(format!("--duration {} s is no time", args.duration)));
     }
     let start = Instant::now();
