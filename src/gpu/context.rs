@@ -41,7 +41,7 @@ impl Validation {
             Validation::Full => (&[Enable::SYNCHRONIZATION_VALIDATION], &[]),
             Validation::Synchronization => (&[Enable::SYNCHRONIZATION_VALIDATION], &[Disable::CORE_CHECKS]),
             Validation::GpuAssisted => {
-                (&[Enable::GPU_ASSISTED, Enable::GPU_ASSISTED_RESERVE_BINDING_SLOT], &[Disable::CORE_CHECKS])
+                (&[Enable::GPU_ASSISTED, Enable::GPU_ASSISTED_RESERVE_BINDING_SLOT], &[])
             }
         }
     }

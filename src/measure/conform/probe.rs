@@ -268,7 +268,9 @@ fn mask_columns(gpu: &Gpu) -> Result<Finding> {
     let mut cases = Vec::new();
     for samples in [1, 4, 8] {
         for row in masks::combination_table(samples) {
-            cases.extend((0..=samples).map(|k| [row[0], row[1], row[2], row[3], k, samples, 0, 0, 0, 0, 0, 0]));
+            cases.extend(
+                (0..=samples).map(|k| [row[0], row[1], row[2], row[3], k, samples, 0, 0, 0, 0, 0, 0]),
+            );
         }
     }
     // The twin, and what both are for: k samples of them.

@@ -108,7 +108,7 @@ mod tests {
             outcome("probe/e", Verdict::UnexpectedPass, "stale"),
         ];
         let xml = junit("driver", &all).unwrap();
-        assert!(xml.contains("tests=\"5\" failures=\"2\""), "{xml}");
+        assert!(xml.contains("tests=\"5\" skipped=\"2\" failures=\"2\""), "{xml}");
         assert!(xml.contains("1 &lt; 2") && xml.contains("time=\"1.500\""), "{xml}");
         let page = sheet("driver", &all);
         assert!(
