@@ -3,6 +3,7 @@
 mod bake;
 mod bench;
 mod compare;
+mod conform;
 mod devices;
 mod options;
 mod output;
@@ -52,6 +53,8 @@ enum Command {
     Tree(tree::Args),
     /// List what a scene requires, with reasons and bytes, without building any of it.
     Plan(plan::Args),
+    /// Check a driver: small scenes and shader functions, each a named case with its reference.
+    Conform(conform::Args),
     /// List the Vulkan devices and whether they fit.
     Devices(devices::Args),
 }
@@ -66,6 +69,7 @@ pub fn run() -> ExitCode {
         Command::Bake(args) => bake::run(&args),
         Command::Tree(args) => tree::run(&args),
         Command::Plan(args) => plan::run(&args),
+        Command::Conform(args) => conform::run(&args),
         Command::Devices(args) => devices::run(&args),
     };
     match done {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use canopy::gpu::{Gpu, GpuOptions};
+use canopy::gpu::{Gpu, GpuOptions, Validation};
 use canopy::scene::{Camera, Scene};
 use canopy::settings::{KNOBS, PRESETS, Settings};
 use canopy::{Error, Result};
@@ -81,7 +81,8 @@ impl DeviceOptions {
     /// Opens the device, works with it and closes it. What the validation layers say comes first: it may be why the work
     /// failed.
     pub fn with<T>(&self, work: impl FnOnce(&Gpu) -> Result<T>) -> Result<T> {
-        let gpu = Gpu::new(&GpuOptions { device: self.device.clone(), validate: self.validate })?;
+        let validation = if self.validate { Validation::Full } else { Validation::Off };
+        let gpu = Gpu::new(&GpuOptions { device: self.device.clone(), validation })?;
         let done = work(&gpu);
         match (gpu.close(), done) {
             (Err(e @ Error::Validation(_)), _) | (_, Err(e)) | (Err(e), Ok(_)) => Err(e),

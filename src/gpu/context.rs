@@ -15,13 +15,46 @@ use crate::{Error, Result};
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
+/// What the validation layers watch. Messages are kept for [`Gpu::messages`], and [`Gpu::close`] fails with them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Validation {
+    /// Nothing: the layers are not loaded.
+    #[default]
+    Off,
+    /// Core and synchronization validation.
+    Full,
+    /// Core validation alone.
+    Core,
+    /// Synchronization validation alone.
+    Synchronization,
+    /// Shaders too, by instrumenting them: slow.
+    GpuAssisted,
+}
+
+impl Validation {
+    /// What the layers do beside, and instead of, core validation.
+    fn features(
+        self,
+    ) -> (&'static [vk::ValidationFeatureEnableEXT], &'static [vk::ValidationFeatureDisableEXT]) {
+        use {vk::ValidationFeatureDisableEXT as Disable, vk::ValidationFeatureEnableEXT as Enable};
+        match self {
+            Validation::Off | Validation::Core => (&[], &[]),
+            Validation::Full => (&[Enable::SYNCHRONIZATION_VALIDATION], &[]),
+            Validation::Synchronization => (&[Enable::SYNCHRONIZATION_VALIDATION], &[Disable::CORE_CHECKS]),
+            Validation::GpuAssisted => {
+                (&[Enable::GPU_ASSISTED, Enable::GPU_ASSISTED_RESERVE_BINDING_SLOT], &[])
+            }
+        }
+    }
+}
+
 /// How to open a device.
 #[derive(Clone, Debug, Default)]
 pub struct GpuOptions {
     /// UUID or part of the name; `None` takes the best that fits.
     pub device: Option<String>,
-    /// Core and synchronization validation; messages are kept for [`Gpu::messages`].
-    pub validate: bool,
+    /// What the validation layers watch.
+    pub validation: Validation,
 }
 
 /// An open Vulkan device. Cheap to clone; the device closes with the last clone or resource.
@@ -88,7 +121,8 @@ impl Gpu {
             .api_version(vk::API_VERSION_1_3);
         // SAFETY: the loader is loaded.
         let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
-        if options.validate && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION)) {
+        let validate = options.validation != Validation::Off;
+        if validate && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION)) {
             return Err(Error::NoDevice(
                 "validation was asked for but VK_LAYER_KHRONOS_validation is not installed \
                  (on Debian: apt-get install vulkan-validationlayers)"
@@ -97,17 +131,19 @@ impl Gpu {
         }
         // SAFETY: the loader is loaded.
         let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
-        let debug_utils = options.validate
-            || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
+        let debug_utils =
+            validate || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
         let layer_names = [VALIDATION.as_ptr()];
         let extension_names = [ext::debug_utils::NAME.as_ptr()];
-        let enables = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
-        let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enables);
+        let (enables, disables) = options.validation.features();
+        let mut features = vk::ValidationFeaturesEXT::default()
+            .enabled_validation_features(enables)
+            .disabled_validation_features(disables);
         let mut create = vk::InstanceCreateInfo::default().application_info(&app);
         if debug_utils {
             create = create.enabled_extension_names(&extension_names);
         }
-        if options.validate {
+        if validate {
             create = create.enabled_layer_names(&layer_names).push_next(&mut features);
         }
         // SAFETY: `create` and what it points to live through the call.
@@ -115,7 +151,7 @@ impl Gpu {
             .map_err(|e| Error::NoDevice(format!("no Vulkan instance: {e}")))?;
 
         let messages = Arc::new(Mutex::new(Vec::new()));
-        let messenger = options.validate.then(|| listen(&entry, &instance, &messages)).transpose()?;
+        let messenger = validate.then(|| listen(&entry, &instance, &messages)).transpose()?;
         let (physical, info) = match choose(&instance, options.device.as_deref()) {
             Ok(found) => found,
             Err(e) => {

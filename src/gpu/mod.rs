@@ -18,7 +18,7 @@ mod timing;
 mod transfer;
 
 pub use ash::vk;
-pub use context::{Gpu, GpuOptions};
+pub use context::{Gpu, GpuOptions, Validation};
 pub use memory::{Buffer, Image, ImageDesc};
 pub use program::{DepthTest, GraphicsDesc, Program, Sampler};
 #[doc(hidden)]

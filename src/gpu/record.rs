@@ -123,18 +123,17 @@ impl Gpu {
     pub(super) fn submit(&self, cmd: vk::CommandBuffer) -> Result<()> {
         let s = &self.shared;
         let value = s.submitted.fetch_add(1, Ordering::AcqRel) + 1;
-        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(cmd)];
-        let signal = [vk::SemaphoreSubmitInfo::default()
-            .semaphore(s.timeline)
-            .value(value)
-            .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
-        let submit =
-            [vk::SubmitInfo2::default().command_buffer_infos(&commands).signal_semaphore_infos(&signal)];
-        let (semaphores, values) = ([s.timeline], [value]);
+        // Not vkQueueSubmit2: after it, GPU-assisted validation (1.3.239) never sees the timeline semaphore signalled.
+        let (commands, semaphores, values) = ([cmd], [s.timeline], [value]);
+        let mut signal = vk::TimelineSemaphoreSubmitInfo::default().signal_semaphore_values(&values);
+        let submit = [vk::SubmitInfo::default()
+            .command_buffers(&commands)
+            .signal_semaphores(&semaphores)
+            .push_next(&mut signal)];
         let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         // SAFETY: the command buffer is complete and its resources are alive until the wait returns.
         unsafe {
-            s.device.queue_submit2(s.queue, &submit, vk::Fence::null()).map_err(device_error("submit"))?;
+            s.device.queue_submit(s.queue, &submit, vk::Fence::null()).map_err(device_error("submit"))?;
             s.device.wait_semaphores(&wait, u64::MAX).map_err(device_error("waiting for the device"))?;
         }
         s.collect(value);

@@ -6,53 +6,21 @@ use std::sync::Arc;
 use canopy::bake::{Baked, load_or_bake_scene};
 use canopy::frame::Renderer;
 use canopy::gpu::interface::Seed;
-use canopy::gpu::{Gpu, GpuOptions, Resource, Shader};
+use canopy::gpu::{Gpu, GpuOptions, Resource, Shader, Validation};
+use canopy::measure::conform::probe;
+pub use canopy::measure::conform::probe::{Arguments, Function, Words, float, words};
 use canopy::plan::Plan;
 use canopy::scene::{self, Camera, Scene};
 
 /// A device with core and synchronization validation. Without one the test fails: it must not pass unseen.
 pub fn open() -> Gpu {
-    Gpu::new(&GpuOptions { device: None, validate: true })
+    Gpu::new(&GpuOptions { device: None, validation: Validation::Full })
         .unwrap_or_else(|e| panic!("this test needs a Vulkan 1.3 device and the validation layer: {e}"))
 }
 
-/// Up to twelve words in.
-pub type Arguments = [u32; 12];
-/// Eight words out.
-pub type Outcome = [u32; 8];
-
-/// The functions of `shaders/probe/physics.comp`.
-#[derive(Clone, Copy, Debug)]
-pub enum Function {
-    Hash = 0,
-    ViewLookup,
-    Hotspot,
-    LeafPhase,
-    HoleOcclusion,
-    GroundContrast,
-    CoveredSamples,
-    MaskColumn,
-    PlaneGradient,
-    ToneCurve,
-    Srgb,
-    ViewLayer,
-    Handover,
-    TableAngles,
-    TableCoordinates,
-}
-
-/// The outcomes of a function for many arguments.
-pub fn evaluate(gpu: &Gpu, function: Function, arguments: &[Arguments]) -> Vec<Outcome> {
-    let shader = &canopy::gpu::shaders::PROBE_PHYSICS_COMP;
-    let inputs = gpu.buffer_with("probe inputs", arguments).unwrap();
-    dispatch(
-        gpu,
-        shader,
-        &[(0, function as u32)],
-        &[("inputs", Resource::Buffer(&inputs))],
-        arguments.len(),
-        &[],
-    )
+/// The results of a function for many arguments.
+pub fn evaluate(gpu: &Gpu, function: Function, arguments: &[Arguments]) -> Vec<Words> {
+    probe::evaluate(gpu, function, arguments).unwrap()
 }
 
 /// Runs a probe over `count` inputs; `more` follows the count in the push constants.
@@ -64,34 +32,7 @@ pub fn dispatch<T: bytemuck::Pod>(
     count: usize,
     more: &[u32],
 ) -> Vec<T> {
-    let program = gpu.compute(shader, constants).unwrap();
-    let results = gpu.buffer("probe results", (count * size_of::<T>()) as u64).unwrap();
-    let mut all = resources.to_vec();
-    all.push(("results", Resource::Buffer(&results)));
-    let mut recorder = gpu.record().unwrap();
-    recorder.compute("probe", |pass| {
-        pass.bind(&program, &all);
-        match *more {
-            [] => pass.push(&(count as u32)),
-            [a] => pass.push(&[count as u32, a]),
-            _ => panic!("at most one more"),
-        }
-        pass.dispatch([(count as u32).div_ceil(64), 1, 1]);
-    });
-    recorder.submit().unwrap();
-    gpu.read(&results, 0, count).unwrap()
-}
-
-/// Bits of floats, padded with zeros.
-pub fn words(floats: &[f32]) -> Arguments {
-    let mut all = [0; 12];
-    floats.iter().zip(&mut all).for_each(|(f, w)| *w = f.to_bits());
-    all
-}
-
-/// A float of an outcome.
-pub fn float(outcome: &Outcome, k: usize) -> f64 {
-    f64::from(f32::from_bits(outcome[k]))
+    probe::dispatch(gpu, shader, constants, resources, count, more).unwrap()
 }
 
 /// The largest error of a check, for messages.

@@ -1,0 +1,179 @@
+//! What must hold of a frame on any driver, and the same bits again.
+
+use std::process::Command;
+use std::sync::Arc;
+
+use super::scenes::{self, SIZE, SceneCase};
+use super::{Finding, Options, finding};
+use crate::bake::{Baked, load_or_bake_scene};
+use crate::frame::{Renderer, auto_exposure};
+use crate::gpu::Gpu;
+use crate::image::Picture;
+use crate::plan::{Plan, ViewMode};
+use crate::scene::{Camera, Scene};
+use crate::{Error, Result};
+
+/// A renderer of a scene of the suite, with its camera and exposure.
+fn renderer(gpu: &Gpu, options: &Options, case: &SceneCase, layers: bool) -> Result<(Renderer, Camera, f64)> {
+    let (scene, camera) = case.load()?;
+    let mut plan = Plan::new(&scene, &camera, SIZE, layers, Some(gpu.info()))?;
+    plan.view_mode = case.mode;
+    let exposure = auto_exposure(&scene);
+    let baked = bakes(&scene, options)?;
+    Ok((Renderer::new(gpu, Arc::new(scene), plan, &baked)?, camera, exposure))
+}
+
+fn bakes(scene: &Scene, options: &Options) -> Result<Vec<Baked>> {
+    let baked = load_or_bake_scene(scene, options.cache.as_deref(), true)?;
+    Ok(baked.into_iter().map(|(b, _)| b).collect())
+}
+
+/// Draws a scene of the suite; the second frame, with everything in the caches, must be the same.
+pub(super) fn draw(gpu: &Gpu, options: &Options, case: &SceneCase, layers: bool) -> Result<Picture> {
+    let (mut renderer, camera, exposure) =
+        renderer(gpu, options, case, layers && case.mode == ViewMode::Radiance)?;
+    renderer.render(&camera, exposure)?;
+    let first = renderer.picture()?;
+    renderer.render(&camera, exposure)?;
+    if renderer.picture()? != first {
+        return Err(Error::Check(format!("{}: a second frame differs from the first", case.name)));
+    }
+    Ok(first)
+}
+
+/// The bits of a picture.
+pub(super) fn digest(p: &Picture) -> String {
+    let mut h = blake3::Hasher::new();
+    h.update(&p.display);
+    if let Some(l) = &p.linear {
+        h.update(bytemuck::cast_slice(&l.sun)).update(bytemuck::cast_slice(&l.sky));
+        h.update(bytemuck::cast_slice(&l.depth)).update(bytemuck::cast_slice(&l.coverage));
+        h.update(bytemuck::cast_slice(&l.species)).update(bytemuck::cast_slice(&l.fractions));
+    }
+    h.finalize().to_hex().to_string()
+}
+
+/// Numbers that are numbers, fractions that sum to what is not background, and no more light than there is.
+pub(super) fn check(gpu: &Gpu, options: &Options, case: &SceneCase) -> Result<Finding> {
+    let picture = draw(gpu, options, case, true)?;
+    let Some(l) = &picture.linear else {
+        // A view mode: its colours are all that there is, and something must show.
+        let mean = picture.display.iter().map(|v| u32::from(*v)).sum::<u32>() / picture.display.len() as u32;
+        return Ok(finding(&[], format!("mean of the display {mean}")));
+    };
+    let (scene, _) = case.load()?;
+    let mut problems = Vec::new();
+    let numbers = l.sun.iter().chain(&l.sky).flatten().chain(&l.depth).chain(&l.coverage);
+    let wrong =
+        numbers.chain(l.fractions.iter().flatten()).filter(|v| !(v.is_finite() && **v >= 0.0)).count();
+    if wrong > 0 {
+        problems.push(format!("{wrong} values are not numbers, or negative"));
+    }
+    // Half floats of a mean of up to eight samples: 2^-11 each, of four fractions.
+    let room = 4.0 / 2048.0;
+    let sum = |k: usize| l.fractions[k].iter().sum::<f32>();
+    let off = (0..l.fractions.len()).map(|k| sum(k) - 1.0).fold(0.0, f32::max);
+    if off > room {
+        problems.push(format!("fractions sum to 1 + {off}"));
+    }
+    let short = interior(&l.depth).into_iter().map(|k| 1.0 - sum(k)).fold(0.0, f32::max);
+    if short > room {
+        problems.push(format!("fractions sum to 1 - {short} where there is no background"));
+    }
+    // No leaf or ground sends back more than the sun's irradiance with albedo 1 would, with the hotspot's 1 + a1 on top; and of the
+    // uniform sky no more than the sky itself.
+    let sun = (1.0 + scene.settings.hotspot_amplitude)
+        * scene.sun.irradiance.iter().fold(0.0f32, |a, b| a.max(*b as f32))
+        / std::f32::consts::PI;
+    let brightest = |of: &[[f32; 3]]| of.iter().flatten().fold(0.0f32, |a, b| a.max(*b));
+    if brightest(&l.sun) > sun {
+        problems.push(format!("sunlit radiance {} of at most {sun}", brightest(&l.sun)));
+    }
+    let sky = case.sky as f32 * 1.002;
+    if brightest(&l.sky) > sky {
+        problems.push(format!("skylit radiance {} of at most {sky}", brightest(&l.sky)));
+    }
+    let trees = l.fractions.iter().map(|k| f64::from(k[2] + k[3])).sum::<f64>() / l.fractions.len() as f64;
+    if trees < 0.02 {
+        problems.push(format!("trees are only {trees:.4} of the picture"));
+    }
+    Ok(finding(
+        &problems,
+        format!("trees {trees:.3} of the picture, fractions within {:.1e} of 1", off.max(short)),
+    ))
+}
+
+/// Pixels around which no background is.
+fn interior(depth: &[f32]) -> Vec<usize> {
+    let [w, h] = SIZE.map(|n| n as usize);
+    let solid = |x: usize, y: usize| depth[y * w + x] > 0.0;
+    let inside = |k: &usize| {
+        let (x, y) = (k % w, k / w);
+        let around = |c: usize, n: usize| c.saturating_sub(1)..(c + 2).min(n);
+        around(y, h).all(|v| around(x, w).all(|u| solid(u, v)))
+    };
+    (0..w * h).filter(inside).collect()
+}
+
+/// The scene of determinism: every pass is in it.
+const DETERMINISM: &str = "hills";
+
+fn scene_of_determinism() -> Result<&'static SceneCase> {
+    let found = scenes::ALL.iter().find(|s| s.name == DETERMINISM);
+    found.ok_or_else(|| Error::Usage(format!("no scene \"{DETERMINISM}\" in the suite")))
+}
+
+/// Another renderer draws the same bits.
+pub(super) fn again(gpu: &Gpu, options: &Options) -> Result<Finding> {
+    let case = scene_of_determinism()?;
+    let (a, b) = (draw(gpu, options, case, true)?, draw(gpu, options, case, true)?);
+    let problem = (a != b).then(|| "two renderers draw other bits".to_string());
+    Ok(finding(problem.as_slice(), digest(&a)[..16].into()))
+}
+
+/// After a flight elsewhere, with tiles thrown out and made again, the first view is the same bits as before: no tile in the
+/// caches is stale.
+pub(super) fn return_flight(gpu: &Gpu, options: &Options) -> Result<Finding> {
+    let (mut renderer, camera, exposure) = renderer(gpu, options, scene_of_determinism()?, true)?;
+    renderer.render(&camera, exposure)?;
+    let before = renderer.picture()?;
+    let mut made = 0;
+    for k in 0..12 {
+        let t = 0.5 * f64::from(k);
+        let mut there = camera.clone();
+        there.position =
+            [4000.0 + 2600.0 * t.cos(), 4000.0 + 2600.0 * t.sin(), 40.0 + 60.0 * f64::from(k % 3)];
+        there.target = [4000.0 - 900.0 * t.sin(), 4000.0 + 900.0 * t.cos(), 0.0];
+        made += renderer.render(&there, exposure)?.produced.coverage;
+    }
+    renderer.render(&camera, exposure)?;
+    let mut problems = Vec::new();
+    if renderer.picture()? != before {
+        problems.push("after a flight the first view has other bits".to_string());
+    }
+    if made == 0 {
+        problems.push("the flight made no tile: it proves nothing".into());
+    }
+    Ok(finding(&problems, format!("{made} coverage tiles made on the way")))
+}
+
+/// A process with another number of driver threads draws the same bits as this one.
+pub(super) fn threads(gpu: &Gpu, options: &Options, threads: &str) -> Result<Finding> {
+    let here = digest(&draw(gpu, options, scene_of_determinism()?, true)?);
+    let mut command = Command::new(&options.program);
+    command.args(["conform", "--digest", DETERMINISM]).env("LP_NUM_THREADS", threads);
+    if let Some(device) = &options.device {
+        command.args(["--device", device]);
+    }
+    if let Some(cache) = &options.cache {
+        command.env("CANOPY_CACHE", cache);
+    }
+    let output = command.output().map_err(|e| Error::io(&options.program, e))?;
+    let there = String::from_utf8_lossy(&output.stdout).trim().to_string();
+    let problem = if !output.status.success() {
+        Some(format!("{}: {}", output.status, String::from_utf8_lossy(&output.stderr).trim()))
+    } else {
+        (there != here).then(|| format!("LP_NUM_THREADS={threads} draws other bits: {there}, here {here}"))
+    };
+    Ok(finding(problem.as_slice(), here[..16].into()))
+}

@@ -1,0 +1,116 @@
+//! The scenes of the suite: a few builtin trees on a plain or on the builtin ridge, drawn small. Each is there for a reason,
+//! which its name tells.
+
+use std::path::Path;
+
+use crate::plan::ViewMode;
+use crate::scene::{self, Camera, Scene};
+use crate::{Error, Result};
+
+/// Size of the pictures.
+pub const SIZE: [u32; 2] = [128, 96];
+
+/// One picture of the suite.
+pub struct SceneCase {
+    pub name: &'static str,
+    ground: &'static str,
+    /// Where the camera stands, above the ground there, what it looks at, and its vertical field of view in degrees.
+    camera: ([f64; 3], [f64; 3], f64),
+    /// Azimuth, elevation and irradiance of the sun.
+    sun: [f64; 3],
+    /// Radiance of the sky.
+    pub sky: f64,
+    knobs: &'static [(&'static str, f64)],
+    pub mode: ViewMode,
+}
+
+const PLAIN: &str = "[terrain]\nextent = 1200.0\nalbedo = [0.13, 0.11, 0.08]\n\
+    [[species]]\nname = \"birch\"\nmodel = \"builtin:birch\"\ndensity = 0.006\nscale = [0.7, 1.2]\n\
+    [[species]]\nname = \"pine\"\nmodel = \"builtin:pine\"\ndensity = 0.006\nscale = [0.6, 1.0]\n";
+const RIDGE: &str = "[terrain]\nheightmap = \"builtin:ridge\"\nalbedo = [0.13, 0.11, 0.08]\n\
+    [[species]]\nname = \"birch\"\nmodel = \"builtin:birch\"\ndensity = 0.012\nbetween_heights = [0.0, 380.0]\nbelow_slope = 38.0\n\
+    [[species]]\nname = \"pine\"\nmodel = \"builtin:pine\"\ndensity = 0.012\nbetween_heights = [220.0, 560.0]\n";
+
+/// A clear day over the plain, from the south-west at the height of the crowns.
+const GROVE: SceneCase = SceneCase {
+    name: "grove",
+    ground: PLAIN,
+    camera: ([560.0, 560.0, 12.0], [600.0, 600.0, 6.0], 50.0),
+    sun: [210.0, 35.0, 1.0],
+    sky: 0.08,
+    knobs: &[],
+    mode: ViewMode::Radiance,
+};
+/// Hills a kilometre and more away.
+const HILLS: SceneCase = SceneCase {
+    name: "hills",
+    ground: RIDGE,
+    camera: ([2900.0, 2700.0, 45.0], [4300.0, 4800.0, -300.0], 45.0),
+    ..GROVE
+};
+/// From above, into the middle of the plain.
+const ABOVE: SceneCase =
+    SceneCase { name: "above", camera: ([600.0, 599.0, 260.0], [600.0, 600.0, 0.0], 50.0), ..GROVE };
+/// From the direction of the sun, 35 degrees high: the shadow of the eye is in the middle of the picture.
+const HOTSPOT: SceneCase =
+    SceneCase { name: "hotspot", camera: ([550.0, 513.4, 70.0], [600.0, 600.0, 0.0], 40.0), ..GROVE };
+/// The whole forest by the shader-map.
+const FAR: &[(&str, f64)] = &[("zfield_min_pixels", 64.0)];
+
+/// Every scene.
+pub const ALL: &[SceneCase] = &[
+    GROVE,
+    HILLS,
+    ABOVE,
+    HOTSPOT,
+    SceneCase { name: "backlit", sun: [45.0, 12.0, 1.0], ..GROVE },
+    SceneCase { name: "overcast", sun: [210.0, 35.0, 0.0], sky: 0.3, ..GROVE },
+    SceneCase { name: "moonless", sky: 0.0, ..GROVE },
+    SceneCase { name: "sunset", sun: [120.0, 0.5, 1.0], ..HILLS },
+    SceneCase { name: "hills-shader-map", knobs: FAR, ..HILLS },
+    SceneCase { name: "hotspot-shader-map", knobs: FAR, ..HOTSPOT },
+    SceneCase {
+        name: "hand-over",
+        camera: ([600.0, 40.0, 60.0], [600.0, 600.0, 0.0], 40.0),
+        knobs: &[("zfield_min_pixels", 3.0)],
+        ..GROVE
+    },
+    SceneCase { name: "silhouettes", knobs: &[("zfield_min_pixels", 8.0)], ..HILLS },
+    SceneCase { name: "inside", camera: ([600.0, 600.0, 3.0], [640.0, 590.0, 6.0], 80.0), ..GROVE },
+    SceneCase { name: "telephoto", camera: ([200.0, 200.0, 40.0], [600.0, 600.0, 5.0], 4.0), ..GROVE },
+    SceneCase { name: "one-sample", knobs: &[("samples", 1.0)], ..GROVE },
+    SceneCase { name: "one-cascade", knobs: &[("cascades", 1.0)], ..ABOVE },
+    SceneCase {
+        name: "accurate-rays",
+        knobs: &[("view_iterations", 3.0), ("light_iterations", 2.0)],
+        ..GROVE
+    },
+    SceneCase { name: "mode-fractions", mode: ViewMode::Fractions, ..GROVE },
+    SceneCase { name: "mode-coverage", mode: ViewMode::Coverage, ..ABOVE },
+    SceneCase { name: "mode-lod", mode: ViewMode::Lod, ..HILLS },
+    SceneCase { name: "mode-cascades", mode: ViewMode::Cascades, ..GROVE },
+    SceneCase { name: "mode-normals", mode: ViewMode::Normals, ..HILLS },
+];
+
+impl SceneCase {
+    /// The scene, with coarse views and small maps so that it is quick to bake and draw, and its camera.
+    pub fn load(&self) -> Result<(Scene, Camera)> {
+        let (position, target, fov) = self.camera;
+        let [azimuth, elevation, irradiance] = self.sun;
+        let text = format!(
+            "name = \"{}\"\nseed = 7\n{}[sun]\nazimuth = {azimuth:?}\nelevation = {elevation:?}\nirradiance = {irradiance:?}\n\
+             [sky]\nradiance = {:?}\n\
+             [[camera]]\nname = \"c\"\nposition = {position:?}\ntarget = {target:?}\nvertical_fov = {fov:?}\n\
+             [quality]\npreset = \"fast\"\nview_rings = 4\nview_resolution = 64\nocclusion_rays = 16\ncascade_size = 256\n\
+             coverage_size = 64\ntable_angles = 8\ntable_densities = 4\ntable_rays = 128\n",
+            self.name, self.ground, self.sky
+        );
+        let mut scene = scene::parse(&text, Path::new(self.name))?;
+        for (knob, value) in self.knobs {
+            scene.settings.set(knob, *value)?;
+        }
+        let camera = scene.cameras.first().cloned();
+        let camera = camera.ok_or_else(|| Error::Usage(format!("{}: no camera", self.name)))?;
+        Ok((scene, camera))
+    }
+}
