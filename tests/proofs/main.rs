@@ -9,6 +9,7 @@ mod cost;
 #[allow(dead_code)] // Each test program uses its own part of this module.
 mod device;
 mod effects;
+mod planted;
 mod plot;
 mod popping;
 mod scale;

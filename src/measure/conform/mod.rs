@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::gpu::{Gpu, GpuOptions, find};
+use crate::plan::ViewMode;
 use crate::{Error, Result};
 
 pub use expectations::{Expectation, Expectations};
@@ -131,7 +132,8 @@ pub fn cases() -> Vec<Case> {
     let case = |kind: &str, name: &str, k: Kind| Case { name: format!("{kind}/{name}"), kind: k };
     let scenes = || scenes::ALL.iter().enumerate();
     let mut all: Vec<Case> = scenes().map(|(k, s)| case("image", s.name, Kind::Image(k))).collect();
-    all.extend(scenes().map(|(k, s)| case("frame", s.name, Kind::Frame(k))));
+    let radiance = scenes().filter(|(_, s)| s.mode == ViewMode::Radiance);
+    all.extend(radiance.map(|(k, s)| case("frame", s.name, Kind::Frame(k))));
     all.extend(probe::ALL.iter().enumerate().map(|(k, p)| case("probe", p.0, Kind::Probe(k))));
     all.push(case("determinism", "again", Kind::Again));
     all.push(case("determinism", "return", Kind::Return));

@@ -1,0 +1,112 @@
+//! Planted faults: each is built into a copy of the sources, and `canopy conform` must name a case that it fails.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::folder;
+
+struct Fault {
+    name: &'static str,
+    file: &'static str,
+    from: &'static str,
+    to: &'static str,
+    /// The case that must fail.
+    case: &'static str,
+}
+
+const FAULTS: &[Fault] = &[
+    Fault {
+        name: "a barrier that makes no write available",
+        file: "src/gpu/record.rs",
+        from: ".src_access_mask(vk::AccessFlags2::MEMORY_WRITE)",
+        to: ".src_access_mask(vk::AccessFlags2::NONE)",
+        case: "validation/synchronization",
+    },
+    Fault {
+        name: "the sign of the hotspot flipped",
+        file: "shaders/physics/light.glsl",
+        from: "return 1.0 - a1 * (1.0 - exp",
+        to: "return 1.0 + a1 * (1.0 - exp",
+        case: "probe/hotspot",
+    },
+    Fault {
+        name: "one row of the mask table wrong",
+        file: "src/physics/masks.rs",
+        from: "row[(bit / 32) as usize] |= mask << (bit % 32);",
+        to: "row[(bit / 32) as usize] |= (if r == 3 && k == 2 { mask ^ 1 } else { mask }) << (bit % 32);",
+        case: "probe/mask-columns",
+    },
+    Fault {
+        name: "a cascade off by one",
+        file: "shaders/physics/shadow.glsl",
+        from: "return nearer < count ? nearer : MAX_CASCADES;",
+        to: "return nearer + 1u < count ? nearer + 1u : MAX_CASCADES;",
+        case: "image/grove",
+    },
+    Fault {
+        name: "a stale tile",
+        file: "src/forest/cache.rs",
+        from: "Some(Slot { index: index as u32, fresh: true })",
+        to: "Some(Slot { index: index as u32, fresh: self.evicted % 7 != 6 })",
+        case: "determinism/return",
+    },
+];
+
+/// The sources, as git knows them, in a folder of their own.
+fn copy() -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let to = folder().join("planted");
+    let listed = Command::new("git")
+        .args(["ls-files", "--cached", "--others", "--exclude-standard"])
+        .current_dir(root)
+        .output();
+    let listed = String::from_utf8(listed.expect("git lists the sources").stdout).unwrap();
+    for file in listed.lines().filter(|f| root.join(f).is_file()) {
+        let place = to.join(file);
+        std::fs::create_dir_all(place.parent().unwrap()).unwrap();
+        // Only what changed, so that cargo builds only that.
+        let bytes = std::fs::read(root.join(file)).unwrap();
+        if std::fs::read(&place).ok().as_ref() != Some(&bytes) {
+            std::fs::write(&place, bytes).unwrap();
+        }
+    }
+    to
+}
+
+#[test]
+#[ignore = "builds the program five times"]
+fn each_planted_fault_is_caught_by_a_named_case() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut missed = Vec::new();
+    for fault in FAULTS {
+        let sources = copy();
+        let path = sources.join(fault.file);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text.matches(fault.from).count(), 1, "{}: {} has moved on", fault.name, fault.file);
+        std::fs::write(&path, text.replace(fault.from, fault.to)).unwrap();
+        let target = folder().join("planted-target");
+        let built = Command::new(env!("CARGO"))
+            .args(["build", "--release", "--locked", "--bin", "canopy", "--quiet"])
+            .current_dir(&sources)
+            .env("CARGO_TARGET_DIR", &target)
+            .env("SHADERC_LIB_DIR", root.join(".deps/shaderc"))
+            .status();
+        assert!(built.expect("cargo runs").success(), "{}: does not build", fault.name);
+        let output = Command::new(target.join("release/canopy"))
+            .args(["conform", fault.case])
+            .current_dir(&sources)
+            .output();
+        let output = output.expect("the program runs");
+        let text = String::from_utf8_lossy(&output.stdout);
+        let reason: String = text
+            .lines()
+            .filter(|l| l.starts_with("fail:"))
+            .map(|l| l.chars().take(160).collect::<String>())
+            .collect();
+        println!("{}: exit {:?}, {reason}", fault.name, output.status.code());
+        if output.status.code() != Some(1) || !reason.contains(fault.case) {
+            missed.push(fault.name);
+        }
+    }
+    assert!(missed.is_empty(), "not caught: {missed:?}");
+}
