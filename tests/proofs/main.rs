@@ -6,7 +6,7 @@
 mod bench;
 mod cost;
 #[path = "../common/device.rs"]
-#[allow(dead_code)] // Each test program uses its own part of this module.
+#[allow(dead_code, unused_imports)] // Each test program uses its own part of this module.
 mod device;
 mod effects;
 mod planted;

@@ -83,7 +83,7 @@ pub(super) fn check(gpu: &Gpu, options: &Options, case: &SceneCase) -> Result<Fi
     // No leaf or ground sends back more than the sun's irradiance with albedo 1 would, with the hotspot's 1 + a1 on top; and of the
     // uniform sky no more than the sky itself.
     let sun = (1.0 + scene.settings.hotspot_amplitude)
-        * scene.sun.irradiance.iter().fold(0.0f32, |a, b| a.max(*b as f32))
+        * scene.sun.irradiance.iter().fold(0.0f32, |a, b| a.max(*b))
         / std::f32::consts::PI;
     let brightest = |of: &[[f32; 3]]| of.iter().flatten().fold(0.0f32, |a, b| a.max(*b));
     if brightest(&l.sun) > sun {

@@ -219,7 +219,7 @@ impl Suite {
         match case.kind {
             Kind::Image(k) => images::check(self, &scenes::ALL[k]),
             Kind::Frame(k) => with_device(o, |gpu| frames::check(gpu, o, &scenes::ALL[k])),
-            Kind::Probe(k) => with_device(o, |gpu| Ok(probe::ALL[k].1(gpu)?.into())),
+            Kind::Probe(k) => with_device(o, |gpu| probe::ALL[k].1(gpu)),
             Kind::Again => with_device(o, |gpu| frames::again(gpu, o)),
             Kind::Return => with_device(o, |gpu| frames::return_flight(gpu, o)),
             Kind::Threads(n) => with_device(o, |gpu| frames::threads(gpu, o, n)),
