@@ -38,7 +38,6 @@
 //! | BN12 §6, tables G, T, D, E of far forests | [`bake::tables`], [`forest::tables`], [`physics::tables`] | `physics/tables.glsl` | `tests/tables.rs`, `tests/gpu/tables.rs` |
 //! | BN12 §6, eq. 13–21, shader-map | [`frame::shader_map`] | `frame/shader_map.*`, `frame/ground.glsl` | `tests/gpu/shader_map.rs` |
 //! | BN12 §7, eq. 22–27, hand-over | [`physics::handover`] | `physics/handover.glsl` | `tests/gpu/tables.rs`, `tests/proofs/` |
-//! | silhouettes beyond the hand-over | [`forest::silhouette`] | `forest/silhouette.glsl` | `tests/gpu/silhouettes.rs` |
 //! | BN12 §9, figures 7 and 8 | [`measure::reflectance`] | | `tests/proofs/scale.rs`, `tests/cli.rs` |
 //! | BN12 §8, culling in order | [`forest::cull`] | `forest/cull.comp`, `forest/scan.comp`, `forest/compact.comp` | `tests/gpu/cull.rs` |
 //! | BN12 §7, trees on silhouettes beyond the hand-over | [`forest::silhouette`] | `forest/silhouette.glsl` | `tests/gpu/silhouettes.rs` |
@@ -46,6 +45,7 @@
 //! | parallel-split shadow maps (Zhang et al. 2006) | [`frame::cascades`], [`frame::shadows`] | `frame/tree_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
 //! | trees that need no file (Weber and Penn 1995) | [`tree`] | | `tests/trees.rs` |
 //! | the scene file | [`scene`] | | `tests/scene_inputs.rs`, `tests/model_inputs.rs` |
+//! | conformance of a driver | [`measure::conform`] | `probe/*` | `tests/conform.rs`, `tests/conformance/`, `tests/proofs/planted.rs` |
 //! | bakes on disk | [`bake::cache`], [`bake::tables`] | | `tests/cache.rs`, `tests/tables.rs` |
 //! | what a scene requires | [`plan`] | | `tests/gpu/plan.rs` |
 //! | the whole frame: extremes, the same bits again | [`frame`] | `frame/*` | `tests/gpu/extremes.rs`, `tests/gpu/determinism.rs` |

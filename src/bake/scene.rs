@@ -57,6 +57,7 @@ pub fn forest_settings(scene: &Scene, species: usize) -> ForestSettings {
 /// # Errors
 /// As [`load_or_bake`] and [`load_or_measure`].
 pub fn load_or_bake_scene(scene: &Scene, dir: Option<&Path>, quiet: bool) -> Result<Vec<(Baked, BakedFrom)>> {
+    let _bake = tracing::info_span!("bake").entered();
     let mut all = Vec::new();
     for (k, s) in scene.species.iter().enumerate() {
         let (species, baked) = load_or_bake(&s.mesh, &s.optics, &(&scene.settings).into(), dir, quiet)?;

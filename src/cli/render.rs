@@ -7,7 +7,7 @@ use std::time::Instant;
 use canopy::bake::{Baked, cache, load_or_bake_scene};
 use canopy::frame::camera::Eye;
 use canopy::frame::{FrameReport, Renderer, auto_exposure};
-use canopy::gpu::{DeviceInfo, Gpu, PassTime};
+use canopy::gpu::{DeviceInfo, FrameCapture, Gpu, PassTime};
 use canopy::plan::{Plan, Representation, ViewMode};
 use canopy::progress::Progress;
 use canopy::scene::{Camera, Scene};
@@ -52,6 +52,9 @@ pub struct Args {
     /// Frames to draw. The first one also fills the caches; times of passes are the last one's
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
+    /// Capture frame N of --frames, from 1, with the RenderDoc that the program runs under
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    capture_frame: Option<u32>,
     #[command(flatten)]
     device: DeviceOptions,
     #[command(flatten)]
@@ -121,6 +124,7 @@ struct Validation {
 struct Outputs {
     png: String,
     exr: Option<String>,
+    captures: Vec<String>,
 }
 
 #[derive(serde::Serialize)]
@@ -153,6 +157,13 @@ pub fn run(args: &Args) -> Result<()> {
     if let Some(exr) = &args.exr {
         output::check(exr, "exr")?;
     }
+    let capture = args.capture_frame.map(|n| match n <= args.frames {
+        true => FrameCapture::attached(),
+        false => {
+            Err(Error::Usage(format!("--capture-frame {n}: only {} of --frames are drawn", args.frames)))
+        }
+    });
+    let capture = capture.transpose()?;
     let (quiet, start) = (args.print.quiet, Instant::now());
     let loading = Progress::new("loading", 1, quiet);
     let (scene, camera) = args.scene.load()?;
@@ -163,7 +174,7 @@ pub fn run(args: &Args) -> Result<()> {
     });
     output::check(&png, "png")?;
     let load_s = start.elapsed().as_secs_f64();
-    args.device.with(|gpu| draw(args, gpu, scene, &camera, png, load_s))
+    args.device.with(|gpu| draw(args, gpu, scene, &camera, png, load_s, capture))
 }
 
 fn stops(text: &str) -> std::result::Result<f64, String> {
@@ -174,7 +185,15 @@ fn stops(text: &str) -> std::result::Result<f64, String> {
 }
 
 /// Everything between opening and closing the device.
-fn draw(args: &Args, gpu: &Gpu, scene: Scene, camera: &Camera, png: PathBuf, load_s: f64) -> Result<()> {
+fn draw(
+    args: &Args,
+    gpu: &Gpu,
+    scene: Scene,
+    camera: &Camera,
+    png: PathBuf,
+    load_s: f64,
+    mut capture: Option<FrameCapture>,
+) -> Result<()> {
     let quiet = args.print.quiet;
     let eye = Eye::new(camera, &scene.terrain, args.scene.size);
     let mut plan = Plan::for_eye(&scene, &eye, args.exr.is_some(), args.representation, Some(gpu.info()))?;
@@ -197,9 +216,13 @@ fn draw(args: &Args, gpu: &Gpu, scene: Scene, camera: &Camera, png: PathBuf, loa
     let progress = Progress::new("drawing", args.frames.into(), quiet);
     let mut frames_s = Vec::new();
     let mut frame = None;
-    for _ in 0..args.frames {
+    for k in 1..=args.frames {
         let start = Instant::now();
-        frame = Some(renderer.render(camera, exposure)?);
+        let mut draw = || renderer.render(camera, exposure);
+        frame = Some(match capture.as_mut().filter(|_| args.capture_frame == Some(k)) {
+            Some(capture) => capture.around(draw),
+            None => draw(),
+        }?);
         frames_s.push(start.elapsed().as_secs_f64());
         progress.step(1);
     }
@@ -247,6 +270,7 @@ fn draw(args: &Args, gpu: &Gpu, scene: Scene, camera: &Camera, png: PathBuf, loa
         outputs: Outputs {
             png: png.display().to_string(),
             exr: args.exr.as_ref().map(|p| p.display().to_string()),
+            captures: capture.iter().flat_map(FrameCapture::files).map(|p| p.display().to_string()).collect(),
         },
     };
     if args.print.json {
@@ -308,8 +332,8 @@ fn text(r: &Report) -> String {
     }
     time.row(["read back and write".into(), format!("{:.3}", t.write_s)]);
     text += &format!("\n{}\nwrote {}\n", time.text(), r.outputs.png);
-    if let Some(exr) = &r.outputs.exr {
-        text += &format!("wrote {exr}\n");
+    for path in r.outputs.exr.iter().chain(&r.outputs.captures) {
+        text += &format!("wrote {path}\n");
     }
     text
 }

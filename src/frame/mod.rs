@@ -13,6 +13,8 @@ pub mod view;
 
 use std::sync::Arc;
 
+use tracing::info_span;
+
 use crate::Result;
 use crate::bake::Baked;
 use crate::clock::{monotonic_ns, process_cpu_ms_since, process_cpu_ns};
@@ -112,6 +114,7 @@ impl Renderer {
     /// # Errors
     /// [`crate::Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, scene: Arc<Scene>, plan: Plan, baked: &[Baked]) -> Result<Self> {
+        let _build = info_span!("build").entered();
         let terrain = TerrainData::new(gpu, &scene, &plan)?;
         let forest = if plan.range > 0.0 {
             let species = SpeciesData::new(gpu, &scene, &plan, baked)?;
@@ -188,6 +191,7 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::render`].
     pub fn draw(&mut self, eye: &Eye, cascades: &[Cascade], exposure: f64) -> Result<(FrameReport, View)> {
+        let _frame = info_span!("frame").entered();
         let (start_ns, cpu) = (monotonic_ns(), process_cpu_ns());
         let evicted = self.evicted();
         let (gpu, scene, plan) = (&self.gpu, &self.scene, &self.plan);
@@ -195,6 +199,7 @@ impl Renderer {
         let [lowest, highest] = self.terrain.tree.total_range();
 
         // Stream: which quads, where in the caches, what is new.
+        let streaming = info_span!("stream").entered();
         let pixels = f64::from(scene.settings.terrain_pixels);
         let mut draws = self.terrain.update(eye, cascades, pixels)?;
         let mut work = None;
@@ -209,6 +214,8 @@ impl Renderer {
         let view = view::view(scene, plan, eye, &self.light, cascades, seeds, step);
         gpu.upload(&self.view, 0, &[view])?;
 
+        drop(streaming);
+        let recording = info_span!("record").entered();
         let record_ns = monotonic_ns();
         let mut recorder = gpu.record()?;
         recorder.stage("stream", |r| {
@@ -242,7 +249,8 @@ impl Renderer {
             }
         });
         self.tonemap.record(&mut recorder, &self.targets, plan, exposure / self.light.scale);
-        let timing = recorder.submit()?;
+        drop(recording);
+        let timing = info_span!("submit").in_scope(|| recorder.submit())?;
         let cpu_ms = process_cpu_ms_since(cpu);
         let ms = |from: u64, to: u64| to.saturating_sub(from) as f64 * 1e-6;
         let after = self.evicted();
@@ -290,6 +298,7 @@ impl Renderer {
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
     pub fn picture(&self) -> Result<Picture> {
+        let _read = info_span!("read back").entered();
         Picture::read(&self.gpu, &self.plan, &self.targets, self.light.scale)
     }
 

@@ -8,6 +8,7 @@
 //! * **Handles outlive their use.** A dropped resource is retired with the number of the next submission and
 //!   destroyed when the timeline semaphore has passed it.
 
+mod capture;
 mod context;
 pub mod interface;
 mod memory;
@@ -18,6 +19,7 @@ mod timing;
 mod transfer;
 
 pub use ash::vk;
+pub use capture::FrameCapture;
 pub use context::{Gpu, GpuOptions, Validation};
 pub use memory::{Buffer, Image, ImageDesc};
 pub use program::{DepthTest, GraphicsDesc, Program, Sampler};

@@ -197,6 +197,7 @@ impl<'g> Recorder<'g> {
             return None;
         }
         self.scopes.push(Scope { name: name.to_string(), pass, cpu_ms: None });
+        let _span = tracing::info_span!("scope", name).entered();
         let gpu = self.gpu;
         // Labels must close in the command buffer that they were opened in.
         let names = gpu.shared.names.as_ref().filter(|_| pass || !self.options.apart);
