@@ -9,6 +9,7 @@
 //!   destroyed when the timeline semaphore has passed it.
 
 mod context;
+mod failures;
 pub mod interface;
 mod memory;
 mod program;
@@ -19,6 +20,8 @@ mod transfer;
 
 pub use ash::vk;
 pub use context::{Gpu, GpuOptions, Validation};
+#[doc(hidden)]
+pub use failures::Failure;
 pub use memory::{Buffer, Image, ImageDesc};
 pub use program::{DepthTest, GraphicsDesc, Program, Sampler};
 #[doc(hidden)]
