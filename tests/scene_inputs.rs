@@ -385,7 +385,8 @@ fn images_that_the_file_cannot_hold_are_refused() {
     std::fs::write(path("b.tif"), bytes).unwrap();
     let [high, wide] = [texture::MAX_SIDE, 2 * texture::MAX_SIDE];
     std::fs::write(path("c.png"), hollow_png(high)).unwrap();
-    std::fs::write(path("d.hdr"), format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {high} +X {wide}\n")).unwrap();
+    std::fs::write(path("d.hdr"), format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {high} +X {wide}\n"))
+        .unwrap();
     exr::prelude::write_rgb_file(path("e.exr"), 4, 2, |_, _| (0.5f32, 0.5f32, 0.5f32)).unwrap();
     let bytes = std::fs::read(path("e.exr")).unwrap();
     let corner = |w: u32, h: u32| [0, 0, w - 1, h - 1].map(u32::to_le_bytes).concat();

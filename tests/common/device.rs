@@ -108,10 +108,12 @@ pub fn jump(scene: &Scene, frame: u32) -> Camera {
     camera(eye, [x + within(-300.0, 300.0), y + within(-300.0, 300.0), within(-200.0, 200.0)])
 }
 
-/// Draws frames from cameras that jump at random, and passes the number of each on to `after`. Device memory must be the
-/// same after every frame: everything is set aside before the first.
+/// Draws frames from cameras that jump at random, and passes the number of each on to `after`. What lives on the device
+/// must stay what it was after the first: a frame leaves at most its last read-back behind for the next to free, and
+/// lists of quads grow by a per cent.
 pub fn soak(gpu: &Gpu, scene: &Scene, frames: u32, mut after: impl FnMut(u32)) {
     let mut renderer = renderer(gpu, scene, &jump(scene, 0), [96, 64], false);
+    let bytes = |report: &[(String, u64)]| report.iter().map(|(_, bytes)| bytes).sum::<u64>();
     let mut first = Vec::new();
     for frame in 0..frames {
         renderer.render(&jump(scene, frame), 1.0).unwrap();
@@ -119,7 +121,11 @@ pub fn soak(gpu: &Gpu, scene: &Scene, frames: u32, mut after: impl FnMut(u32)) {
         if frame == 0 {
             first = now;
         } else {
-            assert!(now == first, "frame {frame}: {now:?} where there was {first:?}");
+            assert!(now.len() <= first.len() + 2, "frame {frame}: {now:?} where there was {first:?}");
+            assert!(
+                100 * bytes(&now) <= 101 * bytes(&first),
+                "frame {frame}: {now:?} where there was {first:?}"
+            );
         }
         after(frame);
     }
