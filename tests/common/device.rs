@@ -108,6 +108,12 @@ pub fn jump(scene: &Scene, frame: u32) -> Camera {
     camera(eye, [x + within(-300.0, 300.0), y + within(-300.0, 300.0), within(-200.0, 200.0)])
 }
 
+/// Two species on ridges, for soaks.
+pub const WOODS: &str = "[terrain]\nheightmap = \"builtin:ridge\"\n[[species]]\nname = \"oak\"\nmodel = \"builtin:oak\"\n\
+    density = 0.02\n[[species]]\nname = \"pine\"\nmodel = \"builtin:pine\"\ndensity = 0.01\nbelow_slope = 30.0\n\
+    [sun]\nazimuth = 180.0\nelevation = 40.0\nirradiance = 1.0\n[sky]\nradiance = 0.1\n\
+    [[camera]]\nname = \"a\"\nposition = [0.0, 0.0, 10.0]\ntarget = [9.0, 9.0, 5.0]\nvertical_fov = 50.0\n";
+
 /// Draws frames from cameras that jump at random, and passes the number of each on to `after`. What lives on the device
 /// must stay what it was after the first: a frame leaves at most its last read-back behind for the next to free, and
 /// lists of quads grow by a per cent.

@@ -13,10 +13,7 @@ fn resident() -> f64 {
 #[ignore = "takes minutes"]
 fn a_thousand_camera_jumps_leave_memory_flat() {
     let gpu = device::open();
-    let mut scene = canopy::scene::default_scene().unwrap();
-    scene.settings = canopy::settings::Settings::preset("fast").unwrap();
-    scene.settings.set("cascade_size", 128.0).unwrap();
-    scene.settings.set("zfield_min_pixels", 8.0).unwrap();
+    let scene = device::small_scene(device::WOODS);
     let mut found = Vec::new();
     device::soak(&gpu, &scene, 1000, |frame| {
         if frame % 100 == 99 {
