@@ -62,6 +62,14 @@ pub(crate) fn check_content(
     Err(Error::input(path, place, what, "the image is damaged or truncated; write it again"))
 }
 
+/// Decodes an image. Decoders of others have been seen to panic on damaged files: that is the file's fault, not the end of
+/// the program.
+pub(crate) fn decoded<T>(path: &Path, place: &str, decode: impl FnOnce() -> Result<T>) -> Result<T> {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(decode)).unwrap_or_else(|_| {
+        Err(Error::input(path, place, "the decoder gave up on this image", "it is damaged; write it again"))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use image::{ImageDecoder, ImageFormat, ImageReader};
 
-use super::input::{check_content, read_bytes};
+use super::input::{check_content, decoded, read_bytes};
 use super::{Sky, Texture};
 use crate::{Error, Result};
 
@@ -46,7 +46,8 @@ pub fn decode_texture(file: &Path, place: &str, bytes: &[u8]) -> Result<Texture>
     let (width, height) = decoder.dimensions();
     check_side(file, place, width.into(), height.into())?;
     check_content(file, place, bytes.len(), (width.into(), height.into()), decoder.total_bytes())?;
-    let rgba = image::DynamicImage::from_decoder(decoder).map_err(bad)?.into_rgba8().into_raw();
+    let decode = || Ok(image::DynamicImage::from_decoder(decoder).map_err(bad)?.into_rgba8().into_raw());
+    let rgba = decoded(file, place, decode)?;
     Ok(Texture { width, height, rgba })
 }
 
