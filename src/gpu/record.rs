@@ -165,7 +165,8 @@ impl<'g> Recorder<'g> {
             let cmd = free.and_then(|()| s.device.allocate_command_buffers(&allocate));
             self.cmd = cmd.map_err(device_error("command buffer"))?[0];
             let free = s.failures.memory();
-            free.and_then(|()| s.device.begin_command_buffer(self.cmd, &begin)).map_err(device_error("recording"))
+            free.and_then(|()| s.device.begin_command_buffer(self.cmd, &begin))
+                .map_err(device_error("recording"))
         }
     }
 
