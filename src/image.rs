@@ -1,13 +1,13 @@
 //! Images out: PNG for eyes, linear EXR with named layers for measurements. Written aside, then renamed.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image as ExrImage, Layer, LayerAttributes, WritableImage,
 };
 use half::f16;
 
+use crate::files::write_whole;
 use crate::frame::camera::NEAR_PLANE;
 use crate::frame::targets::ImageTargets;
 use crate::gpu::Gpu;
@@ -144,51 +144,4 @@ impl Picture {
             .map_err(|e| Error::io(path, std::io::Error::other(e)))?;
         write_whole(path, bytes.get_ref())
     }
-}
-
-/// Writes a file as a whole or not at all: beside its place, synchronised, then renamed.
-///
-/// # Errors
-/// [`Error::Io`].
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let beside = beside(path)?;
-    let written = (|| {
-        let mut file = std::fs::File::create(&beside)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        std::fs::rename(&beside, path)
-    })();
-    written.map_err(|e| {
-        // Best effort: the write has failed already.
-        let _ = std::fs::remove_file(&beside);
-        Error::io(path, e)
-    })
-}
-
-/// Whether [`write_whole`] could write there now: for finding out before a long run. Leaves nothing behind.
-///
-/// # Errors
-/// [`Error::Usage`] naming a folder that is missing; [`Error::Io`].
-pub fn check_writable(path: &Path) -> Result<()> {
-    let beside = beside(path)?;
-    if path.is_dir() {
-        return Err(Error::Usage(format!("{} is a folder; name a file in it", path.display())));
-    }
-    if let Some(folder) = path.parent().filter(|p| !p.as_os_str().is_empty() && !p.is_dir()) {
-        return Err(Error::Usage(format!(
-            "{}: there is no folder {}; make it first",
-            path.display(),
-            folder.display()
-        )));
-    }
-    std::fs::File::create(&beside).and_then(|_| std::fs::remove_file(&beside)).map_err(|e| Error::io(path, e))
-}
-
-/// Where a file stands until it is complete.
-fn beside(path: &Path) -> Result<PathBuf> {
-    let name = path.file_name().ok_or_else(|| Error::Usage(format!("{} is no file name", path.display())))?;
-    let mut beside = std::ffi::OsString::from(".");
-    beside.push(name);
-    beside.push(format!(".{}", std::process::id()));
-    Ok(path.with_file_name(beside))
 }

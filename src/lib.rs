@@ -52,7 +52,10 @@
 //! | timestamps, statistics of the pipeline, CPU time a pass | [`gpu::Timing`], [`clock`] | | `tests/bench.rs`, `tests/proofs/bench.rs` |
 //! | benches along camera paths | [`measure::bench`], [`measure::path`], [`measure::results`], [`measure::trace`] | | `tests/bench.rs` |
 //! | what differs between two benches | [`measure::compare`], [`measure::statistics`] | | `tests/compare.rs`, `tests/proofs/bench.rs` |
-//! | the program | `src/cli/` | | `tests/cli.rs` |
+//! | files whole or not at all | [`files`] | | `tests/robustness.rs` |
+//! | what reads files, fuzzed | [`scene`], [`bake`] | | `tests/fuzz/` |
+//! | memory that runs out, a lost device | [`gpu`] | | `tests/gpu/failures.rs`, `tests/robustness.rs` |
+//! | the program | `src/cli/` | | `tests/cli.rs`, `tests/robustness.rs` |
 //!
 //! Structs and constants that Rust and GLSL share stand once, in `shaders/interface.glsl`; `build.rs` compiles and
 //! reflects every shader and writes their Rust side, [`gpu::interface`]. Every knob stands once, in [`settings`].
@@ -61,6 +64,7 @@
 pub mod bake;
 pub mod clock;
 pub mod error;
+pub mod files;
 pub mod forest;
 pub mod frame;
 pub mod gpu;

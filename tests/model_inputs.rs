@@ -206,6 +206,13 @@ fn wrong_models_are_refused_with_the_place() {
             d["accessors"][0]["sparse"] = json!({"count": 9, "indices": {"bufferView": 3, "componentType": 5123},
                 "values": {"bufferView": 0}});
         }),
+        // A few bytes that ask for gigabytes of zeros.
+        ("no bufferView and only 1 of its 16000000 entries", |d, _| {
+            d["accessors"][0].as_object_mut().unwrap().remove("bufferView");
+            d["accessors"][0]["count"] = json!(16_000_000);
+            d["accessors"][0]["sparse"] = json!({"count": 1, "indices": {"bufferView": 3, "componentType": 5123},
+                "values": {"bufferView": 0}});
+        }),
         ("KHR_mesh_quantization", |d, _| d["accessors"][0]["componentType"] = json!(5122)),
         ("indices", |d, _| d["accessors"][3]["componentType"] = json!(5126)),
         ("buffers[0]", |d, _| d["buffers"][0]["byteLength"] = json!(1_000_000)),

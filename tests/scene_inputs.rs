@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use canopy::Error;
 use canopy::scene::{self, Albedo, Distribution, Scene, Sky};
-use inputs::{assert_valid, damaged, data, huge_png, message, png};
+use inputs::{assert_valid, damaged, data, hollow_png, huge_png, message, png};
 
 const PLAIN: &str = "[terrain]\nextent = 1000.0\n[[camera]]\nname = \"a\"\nposition = [1.0, 2.0, 3.0]\ntarget = [4.0, 5.0, 6.0]\nvertical_fov = 45.0\n";
 
@@ -364,4 +364,99 @@ fn damaged_files_never_panic() {
         assert!(refused > 50, "{name}: only {refused} refused");
     }
     assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
+}
+
+/// Sizes that are allowed, in files that are too small for them: refused before a gigabyte is set aside.
+#[test]
+fn images_that_the_file_cannot_hold_are_refused() {
+    use canopy::scene::raster::{MAX_SIDE, load_heights};
+    use canopy::scene::texture::{self, load_sky, load_texture};
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("a.png"), hollow_png(MAX_SIDE)).unwrap();
+    tiff::<tiff::encoder::colortype::Gray32Float>(&path("b.tif"), 2, 2, &[1.0; 4]);
+    let mut bytes = std::fs::read(path("b.tif")).unwrap();
+    // Width and height: tags 256 and 257, one 32-bit value each.
+    for tag in [256u16, 257] {
+        let entry = [&tag.to_le_bytes()[..], &[4, 0, 1, 0, 0, 0]].concat();
+        let at = bytes.windows(8).position(|w| w == entry).unwrap() + 8;
+        bytes[at..at + 4].copy_from_slice(&MAX_SIDE.to_le_bytes());
+    }
+    std::fs::write(path("b.tif"), bytes).unwrap();
+    let [high, wide] = [texture::MAX_SIDE, 2 * texture::MAX_SIDE];
+    std::fs::write(path("c.png"), hollow_png(high)).unwrap();
+    std::fs::write(path("d.hdr"), format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {high} +X {wide}\n"))
+        .unwrap();
+    exr::prelude::write_rgb_file(path("e.exr"), 4, 2, |_, _| (0.5f32, 0.5f32, 0.5f32)).unwrap();
+    let bytes = std::fs::read(path("e.exr")).unwrap();
+    let corner = |w: u32, h: u32| [0, 0, w - 1, h - 1].map(u32::to_le_bytes).concat();
+    let (small, large) = (corner(4, 2), corner(wide, high));
+    let large: Vec<u8> = (0..bytes.len())
+        .map(|i| {
+            let start = (0..16).find(|k| i >= *k && bytes[i - k..].starts_with(&small));
+            start.map_or(bytes[i], |k| large[k])
+        })
+        .collect();
+    std::fs::write(path("e.exr"), large).unwrap();
+    for error in [
+        message(load_heights(&path("a.png"), Some([0.0, 1.0]))),
+        message(load_heights(&path("b.tif"), None)),
+        message(load_texture(&path("c.png"))),
+        message(load_sky(&path("d.hdr"))),
+        message(load_sky(&path("e.exr"))),
+    ] {
+        assert!(error.contains("the header announces"), "{error}");
+    }
+}
+
+/// Seeds and findings of the fuzz targets in tests/fuzz: what was found once stays mended.
+#[test]
+fn fuzz_seeds_and_findings_are_read_or_refused() {
+    use canopy::scene::model::load_model_bytes;
+    use canopy::scene::positions::load_positions;
+    use canopy::scene::raster::{load_density, load_heights};
+    use canopy::scene::texture::{load_sky, load_texture};
+    type Load = fn(&Path) -> canopy::Result<()>;
+    let fuzz = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz");
+    let targets: [(&str, &[Load]); 5] = [
+        ("scene", &[|p| scene::load(p).map(drop)]),
+        ("model", &[|p| load_model_bytes(p, &std::fs::read(p).unwrap(), None, None).map(drop)]),
+        (
+            "raster",
+            &[
+                |p| load_heights(p, None).map(drop),
+                |p| load_heights(p, Some([0.0, 100.0])).map(drop),
+                |p| load_density(p).map(drop),
+            ],
+        ),
+        ("picture", &[|p| load_texture(p).map(drop), |p| load_sky(p).map(drop)]),
+        (
+            "inventory",
+            &[
+                |p| load_positions(p, [0.0; 2], [100.0; 2]).map(drop),
+                |p| load_positions(p, [5e5, 4e6], [1e7; 2]).map(drop),
+            ],
+        ),
+    ];
+    for (target, loads) in targets {
+        for kind in ["seeds", "findings"] {
+            let Ok(folder) = std::fs::read_dir(fuzz.join(kind).join(target)) else {
+                assert_eq!(kind, "findings", "the seeds of {target} are missing");
+                continue;
+            };
+            for file in folder {
+                let path = file.unwrap().path();
+                let mut read = 0;
+                for load in loads {
+                    match load(&path) {
+                        Ok(()) => read += 1,
+                        Err(error) => assert_eq!(error.exit_code(), 2, "{}: {error}", path.display()),
+                    }
+                }
+                // A seed that no reader takes would lead the fuzzer nowhere; the one scene shows every kind of number.
+                let meant = kind == "findings" || path.ends_with("inline.toml");
+                assert!(read > 0 || meant, "{} is refused", path.display());
+            }
+        }
+    }
 }

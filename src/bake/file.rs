@@ -2,18 +2,17 @@
 //!
 //! A file holds, little endian: magic, format version, key, parts of bytes, and the BLAKE3 of all that. The sizes of the
 //! parts follow from the settings, so nothing in the file is believed about lengths: a file of another size is not read.
-//! Files are written under a name of their own and renamed when complete, so that two processes at once, or a crash, leave
-//! either a whole file or none.
+//! Files are written aside and renamed when complete, so that two processes at once, or a crash, leave either a whole file
+//! or none.
 
-use std::collections::hash_map::RandomState;
-use std::fs::{self, File, OpenOptions};
-use std::hash::{BuildHasher, Hasher};
+use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::CacheState;
 use crate::Result;
+use crate::files::Unfinished;
 
 const HEADER: usize = 8 + 4 + 32;
 const CHECKSUM: usize = 32;
@@ -105,6 +104,10 @@ fn damaged(what: &str) -> io::Error {
 }
 
 fn read(path: &Path, header: &[u8; HEADER], sizes: &[usize]) -> io::Result<Vec<Vec<u8>>> {
+    // Asked before it is opened: opening a pipe would wait for a writer.
+    if !fs::metadata(path)?.is_file() {
+        return Err(damaged("this is not a regular file"));
+    }
     let mut file = File::open(path)?;
     let expected = HEADER + sizes.iter().sum::<usize>() + CHECKSUM;
     if file.metadata()?.len() != expected as u64 {
@@ -132,16 +135,6 @@ fn read(path: &Path, header: &[u8; HEADER], sizes: &[usize]) -> io::Result<Vec<V
     Ok(parts)
 }
 
-/// A file that is removed unless it has been renamed.
-struct Temporary(PathBuf);
-
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        // It is gone after the rename, and there is nothing to be done about any other failure.
-        let _ = fs::remove_file(&self.0);
-    }
-}
-
 fn write(
     dir: &Path,
     path: &Path,
@@ -149,11 +142,7 @@ fn write(
     encode: impl FnOnce(&mut dyn FnMut(&[u8]) -> io::Result<()>) -> io::Result<()>,
 ) -> io::Result<()> {
     fs::create_dir_all(dir)?;
-    // A random name: process numbers repeat between containers that share a directory.
-    let mine = format!("tmp-{:016x}", RandomState::new().build_hasher().finish());
-    let temporary = path.with_extension(mine);
-    let mut file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
-    let temporary = Temporary(temporary);
+    let mut file = Unfinished::new(path)?;
     let mut hasher = blake3::Hasher::new();
     let mut put = |part: &[u8]| {
         hasher.update(part);
@@ -162,6 +151,5 @@ fn write(
     put(header)?;
     encode(&mut put)?;
     file.write_all(hasher.finalize().as_bytes())?;
-    file.sync_all()?;
-    fs::rename(&temporary.0, path)
+    file.finish()
 }

@@ -1,7 +1,8 @@
 //! Species to data: z-field views, occlusion, optics; cached on disk by content.
 
 pub mod cache;
-mod file;
+#[doc(hidden)]
+pub mod file;
 mod occlusion;
 mod optics;
 mod raster;
@@ -15,7 +16,7 @@ mod views;
 pub use cache::{CacheState, load_or_bake};
 pub use scene::{Baked, BakedFrom, forest_settings, load_or_bake_scene, pattern_density};
 pub use tables::{ForestSettings, ForestTables, load_or_measure};
-pub use verify::{QualityReport, ViewQuality, verify};
+pub use verify::{QualityReport, ViewQuality, demand, verify};
 
 use crate::progress::Progress;
 use crate::scene::{Mesh, OpticsOverride};

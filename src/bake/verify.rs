@@ -6,10 +6,10 @@ use rayon::prelude::*;
 use super::SpeciesBake;
 use super::raster::{Raster, SUBSAMPLES, View};
 use super::surface::Surface;
-use crate::Result;
 use crate::physics::views::{self, Basis};
 use crate::physics::zfield::{self, Ray};
 use crate::scene::Mesh;
+use crate::{Error, Result};
 
 /// Agreement of a z-field with its mesh from one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +43,20 @@ impl QualityReport {
     pub fn mean(&self, of: impl Fn(&ViewQuality) -> f64) -> f64 {
         self.views.iter().map(of).sum::<f64>() / self.views.len().max(1) as f64
     }
+}
+
+/// A gate for scripts.
+///
+/// # Errors
+/// [`Error::Check`] if the worst silhouette agreement of `what` is less than `least`.
+pub fn demand(what: &str, min_iou: f64, least: f64) -> Result<()> {
+    if min_iou >= least {
+        return Ok(());
+    }
+    Err(Error::Check(format!(
+        "{what}: from one direction the silhouettes of z-field and mesh agree to {min_iou:.4} only; {least} were asked for \
+         (raise view_rings, view_resolution or view_iterations)"
+    )))
 }
 
 /// Compares the z-field with the mesh from `directions` directions, spread over the upper hemisphere and at

@@ -19,6 +19,7 @@ Examples:
   canopy bake oak.glb --height 15           as a scene with `height = 15.0` needs it
   canopy bake my.toml                       every species of a scene
   canopy bake oak.glb --verify 64           how well the z-field stands for the mesh
+  canopy bake oak.glb --verify 64 --min-iou 0.8   and exit code 1 if it is worse than that
   canopy bake oak.glb --set view_rings=6    with fewer views
   canopy bake oak.glb --forest 0.03         and the tables of a far forest of 0.03 trees per m²
 Bakes are kept in $CANOPY_CACHE, else $XDG_CACHE_HOME/canopy, else ~/.cache/canopy.";
@@ -34,6 +35,9 @@ pub struct Args {
     /// Compare the bake with its mesh from N directions between the stored views
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     verify: Option<u32>,
+    /// Exit with code 1 if the worst of these directions agrees less (IoU of the silhouettes, after the most iterations)
+    #[arg(long, value_name = "0..1", requires = "verify")]
+    min_iou: Option<f64>,
     /// Measure the tables of the species' far forest, for patterns of D trees per m²
     #[arg(long, value_name = "D")]
     forest: Option<f64>,
@@ -128,12 +132,13 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let report = Report { schema_version: SCHEMA_VERSION, command: "bake", species };
     if args.print.json {
-        output::json(&report)
-    } else if args.print.quiet {
-        Ok(())
-    } else {
-        output::print(&report.species.iter().map(text).collect::<String>())
+        output::json(&report)?;
+    } else if !args.print.quiet {
+        output::print(&report.species.iter().map(text).collect::<String>())?;
     }
+    let Some(least) = args.min_iou else { return Ok(()) };
+    let last = report.species.iter().filter_map(|b| Some((b, b.verify.last()?)));
+    last.into_iter().try_for_each(|(b, q)| bake::demand(&b.name, q.iou_min, least))
 }
 
 /// Bakes one species and, if asked, compares.

@@ -220,7 +220,7 @@ fn report(args: &Args, results: &[BenchResult]) -> Result<()> {
 }
 
 fn write(file: &Path, text: &str) -> Result<()> {
-    canopy::image::write_whole(file, text.as_bytes())
+    canopy::files::write_whole(file, text.as_bytes())
 }
 
 /// The table.

@@ -105,10 +105,10 @@ pub fn run(args: &Args) -> Result<()> {
     }
     progress.finish();
     if let Some(path) = &args.junit {
-        canopy::image::write_whole(path, conform::junit(suite.driver(), &outcomes)?.as_bytes())?;
+        canopy::files::write_whole(path, conform::junit(suite.driver(), &outcomes)?.as_bytes())?;
     }
     if let Some(path) = &args.sheet {
-        canopy::image::write_whole(path, conform::sheet(suite.driver(), &outcomes).as_bytes())?;
+        canopy::files::write_whole(path, conform::sheet(suite.driver(), &outcomes).as_bytes())?;
     }
     print(args, suite.driver(), &outcomes)?;
     let failed: Vec<&str> =

@@ -72,5 +72,5 @@ pub fn check(path: &Path, wanted: &str) -> Result<()> {
     if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted)) {
         return Err(Error::Usage(format!("{} will be a {wanted} file: name it *.{wanted}", path.display())));
     }
-    canopy::image::check_writable(path)
+    canopy::files::check_writable(path)
 }

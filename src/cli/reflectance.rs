@@ -136,7 +136,7 @@ pub fn run(args: &Args) -> Result<()> {
     let rows = args.device.with(|gpu| all(args, gpu, &scene, &camera, &densities))?;
     let text = csv(&rows);
     if let Some(out) = &args.out {
-        canopy::image::write_whole(out, text.as_bytes())?;
+        canopy::files::write_whole(out, text.as_bytes())?;
     }
     if args.print.json {
         let command = "reflectance";

@@ -52,7 +52,7 @@ pub fn run(args: &Args) -> Result<()> {
     let glb = tree::glb(preset, args.seed);
     // Read back as any model is: what is written here will load.
     let mesh = load_model_bytes(&path, &glb, None, None)?;
-    canopy::image::write_whole(&path, &glb)?;
+    canopy::files::write_whole(&path, &glb)?;
     let report = Report {
         schema_version: SCHEMA_VERSION,
         command: "tree",

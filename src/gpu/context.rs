@@ -7,8 +7,9 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
+use super::failures::{Failure, Failures};
 use super::memory::Retired;
-use super::program::{Sampler, make_samplers};
+use super::program::Sampler;
 use super::select::{DeviceInfo, choose};
 use super::timing::{Calibration, TimingState, calibration_extension};
 use crate::{Error, Result};
@@ -82,11 +83,30 @@ pub(super) struct Shared {
     pub samplers: Vec<vk::Sampler>,
     pub info: DeviceInfo,
     pub timing: TimingState,
+    pub failures: Failures,
+    // Last: the instance must outlive everything made through it.
+    root: Root,
+}
+
+/// The instance, and what listens to its validation layers.
+struct Root {
     messages: Arc<Mutex<Vec<String>>>,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     instance: ash::Instance,
     // Last: the loader must outlive everything made through it.
     _entry: ash::Entry,
+}
+
+impl Drop for Root {
+    fn drop(&mut self) {
+        // SAFETY: `Shared`, the only other user, is gone or was never made: no device and no other child is alive.
+        unsafe {
+            if let Some((debug, messenger)) = self.messenger.take() {
+                debug.destroy_debug_utils_messenger(messenger, None);
+            }
+            self.instance.destroy_instance(None);
+        }
+    }
 }
 
 pub(super) fn load_entry() -> Result<ash::Entry> {
@@ -100,7 +120,21 @@ pub(super) fn load_entry() -> Result<ash::Entry> {
 
 /// Maps a Vulkan failure to the error that carries the right exit code.
 pub(super) fn device_error(what: &str) -> impl FnOnce(vk::Result) -> Error + '_ {
-    move |e| Error::Device(format!("{what}: {e}"))
+    move |e| {
+        let remedy = match e {
+            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
+                "out of device memory; choose a smaller --size or a lower --quality (`canopy plan` lists what takes how much), or close what else uses the device"
+            }
+            vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
+                "the driver is out of host memory; choose a smaller --size or a lower --quality, or close other programs"
+            }
+            vk::Result::ERROR_DEVICE_LOST => {
+                "the device was lost: its driver reset it, or another program crashed it; run again, and see the system's log"
+            }
+            other => return Error::Device(format!("{what}: {other}")),
+        };
+        Error::Device(format!("{what}: {remedy}"))
+    }
 }
 
 pub(super) fn lock<T>(m: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -112,8 +146,9 @@ impl Gpu {
     ///
     /// # Errors
     /// [`Error::NoDevice`] with the reason for every device when none fits, or when validation is asked for and
-    /// its layer is not installed.
+    /// its layer is not installed; [`Error::Device`] when memory runs out.
     pub fn new(options: &GpuOptions) -> Result<Self> {
+        let failures = Failures::from_environment()?;
         let entry = load_entry()?;
         let app = vk::ApplicationInfo::default()
             .application_name(c"canopy")
@@ -150,22 +185,13 @@ impl Gpu {
         let instance = unsafe { entry.create_instance(&create, None) }
             .map_err(|e| Error::NoDevice(format!("no Vulkan instance: {e}")))?;
 
-        let messages = Arc::new(Mutex::new(Vec::new()));
-        let messenger = validate.then(|| listen(&entry, &instance, &messages)).transpose()?;
-        let (physical, info) = match choose(&instance, options.device.as_deref()) {
-            Ok(found) => found,
-            Err(e) => {
-                // SAFETY: nothing but the messenger was made from the instance.
-                unsafe {
-                    if let Some((debug, m)) = &messenger {
-                        debug.destroy_debug_utils_messenger(*m, None);
-                    }
-                    instance.destroy_instance(None);
-                }
-                return Err(e);
-            }
-        };
-        let shared = open(entry, instance, physical, info, debug_utils, messages, messenger)?;
+        let mut root =
+            Root { messages: Arc::default(), messenger: None, instance: instance.clone(), _entry: entry };
+        if validate {
+            root.messenger = Some(listen(&root._entry, &instance, &root.messages)?);
+        }
+        let (physical, info) = choose(&instance, options.device.as_deref())?;
+        let shared = open(root, physical, info, debug_utils, failures)?;
         Ok(Gpu { shared: Arc::new(shared) })
     }
 
@@ -176,7 +202,7 @@ impl Gpu {
 
     /// Validation messages so far; empty without validation.
     pub fn messages(&self) -> Vec<String> {
-        lock(&self.shared.messages).clone()
+        lock(&self.shared.root.messages).clone()
     }
 
     /// Bytes that live buffers and images hold, by their names, largest first.
@@ -199,16 +225,39 @@ impl Gpu {
         heaps.iter().enumerate().map(|(k, h)| (name(k, local(h)), bytes[k])).collect()
     }
 
-    /// Waits for the device, then reports what should not be: validation messages and live allocations.
+    /// Makes the `n`-th place from now on fail, for tests; 0 stops that.
+    #[doc(hidden)]
+    pub fn fail(&self, failure: Failure, n: u32) {
+        self.shared.failures.arm(failure, n);
+    }
+
+    /// Places that need memory, and submissions and waits, since [`Gpu::fail`]: as many can fail.
+    #[doc(hidden)]
+    pub fn passed(&self) -> [u32; 2] {
+        self.shared.failures.passed()
+    }
+
+    /// Makes an object that nothing destroys, so that a test can prove that closing reports one.
+    #[doc(hidden)]
+    pub fn forget_for_test(&self) {
+        // SAFETY: the device is alive, and the object is never used.
+        let _ = unsafe { self.shared.device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) };
+    }
+
+    /// Waits for the device, then reports what should not be: validation messages and live allocations. Closes the device
+    /// if this is its last owner, so that the layers also say which objects were forgotten.
     /// Call it when every resource has been dropped.
     ///
     /// # Errors
-    /// [`Error::Validation`] with every message; [`Error::Check`] with the names of what is still allocated.
+    /// [`Error::Validation`] with every message; [`Error::Check`] with the names of what is still allocated;
+    /// [`Error::Device`] if the device fails.
     pub fn close(self) -> Result<()> {
-        // SAFETY: the device is alive; no other thread submits.
-        unsafe { self.shared.device.device_wait_idle() }.map_err(device_error("waiting for the device"))?;
+        let waited = self.shared.wait_idle().map_err(device_error("waiting for the device"));
         self.shared.collect(u64::MAX);
-        let messages = self.messages();
+        let live = self.memory_report();
+        let messages = self.shared.root.messages.clone();
+        drop(self);
+        let messages = lock(&messages);
         if !messages.is_empty() {
             let mut text = format!("{} validation message(s):", messages.len());
             // A message that every pass repeats is shown once.
@@ -218,12 +267,11 @@ impl Gpu {
             }
             return Err(Error::Validation(text));
         }
-        let live = self.memory_report();
         if !live.is_empty() {
             let names: Vec<String> = live.iter().map(|(n, b)| format!("{n} ({b} bytes)")).collect();
             return Err(Error::Check(format!("still allocated at exit: {}", names.join(", "))));
         }
-        Ok(())
+        waited
     }
 }
 
@@ -241,7 +289,7 @@ fn listen(
         .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
         .pfn_user_callback(Some(on_message))
         .user_data(Arc::as_ptr(messages) as *mut c_void);
-    // SAFETY: `messages` is kept by `Shared` until after the messenger is destroyed.
+    // SAFETY: `messages` is kept by `Root` until after the messenger is destroyed.
     let messenger = unsafe { debug.create_debug_utils_messenger(&create, None) }
         .map_err(device_error("debug messenger"))?;
     Ok((debug, messenger))
@@ -254,7 +302,7 @@ unsafe extern "system" fn on_message(
     data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
     user: *mut c_void,
 ) -> vk::Bool32 {
-    // SAFETY: the layer passes valid data; `user` is the message list that `Shared` keeps alive.
+    // SAFETY: the layer passes valid data; `user` is the message list that `Root` keeps alive.
     unsafe {
         let text = CStr::from_ptr((*data).p_message).to_string_lossy().into_owned();
         lock(&*(user as *const Mutex<Vec<String>>)).push(text);
@@ -263,15 +311,15 @@ unsafe extern "system" fn on_message(
 }
 
 fn open(
-    entry: ash::Entry,
-    instance: ash::Instance,
+    root: Root,
     physical: vk::PhysicalDevice,
     info: DeviceInfo,
     debug_utils: bool,
-    messages: Arc<Mutex<Vec<String>>>,
-    messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    failures: Failures,
 ) -> Result<Shared> {
-    // SAFETY: instance and physical device are alive throughout; every create struct outlives its call.
+    let instance = root.instance.clone();
+    // SAFETY: instance and physical device are alive throughout; every create struct outlives its call. On failure
+    // `Shared` destroys what was made so far.
     unsafe {
         let families = instance.get_physical_device_queue_family_properties(physical);
         let all_work = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
@@ -282,7 +330,7 @@ fn open(
             as u32;
         let queue_info =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
-        let calibration = calibration_extension(&entry, &instance, physical);
+        let calibration = calibration_extension(&root._entry, &instance, physical);
         let extensions: Vec<_> =
             [Some(khr::push_descriptor::NAME), calibration].into_iter().flatten().map(CStr::as_ptr).collect();
         let features =
@@ -303,24 +351,7 @@ fn open(
         let device = instance
             .create_device(physical, &create, None)
             .map_err(|e| Error::NoDevice(format!("{}: cannot open the device: {e}", info.name)))?;
-        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
-        let timeline = device
-            .create_semaphore(&vk::SemaphoreCreateInfo::default().push_next(&mut kind), None)
-            .map_err(device_error("timeline semaphore"))?;
-        let pool = device
-            .create_command_pool(&vk::CommandPoolCreateInfo::default().queue_family_index(family), None)
-            .map_err(device_error("command pool"))?;
-        let allocator = Allocator::new(&AllocatorCreateDesc {
-            instance: instance.clone(),
-            device: device.clone(),
-            physical_device: physical,
-            debug_settings: Default::default(),
-            buffer_device_address: false,
-            allocation_sizes: Default::default(),
-        })
-        .map_err(|e| Error::Device(format!("allocator: {e}")))?;
-        let samplers = make_samplers(&device)?;
-        debug_assert_eq!(samplers.len(), Sampler::ALL.len());
+        let valid_bits = families[family as usize].timestamp_valid_bits;
         let calibration = calibration.map(|name| {
             if name == khr::calibrated_timestamps::NAME {
                 Calibration::Khr(khr::calibrated_timestamps::Device::new(&instance, &device))
@@ -328,27 +359,50 @@ fn open(
                 Calibration::Ext(ext::calibrated_timestamps::Device::new(&instance, &device))
             }
         });
-        let valid_bits = families[family as usize].timestamp_valid_bits;
-        Ok(Shared {
+        let mut shared = Shared {
             timing: TimingState { calibration, valid_bits, ..TimingState::default() },
+            memory: instance.get_physical_device_memory_properties(physical),
+            heap_bytes: Mutex::new([0; vk::MAX_MEMORY_HEAPS]),
             push: khr::push_descriptor::Device::new(&instance, &device),
             names: debug_utils.then(|| ext::debug_utils::Device::new(&instance, &device)),
             queue: device.get_device_queue(family, 0),
-            device,
-            pool,
-            timeline,
+            device: device.clone(),
+            pool: vk::CommandPool::null(),
+            timeline: vk::Semaphore::null(),
             submitted: AtomicU64::new(0),
-            allocator: Mutex::new(Some(allocator)),
+            allocator: Mutex::new(None),
             retired: Mutex::new(Vec::new()),
-            memory: instance.get_physical_device_memory_properties(physical),
-            heap_bytes: Mutex::new([0; vk::MAX_MEMORY_HEAPS]),
-            samplers,
+            samplers: Vec::new(),
             info,
-            messages,
-            messenger,
+            failures,
+            root,
+        };
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let semaphore = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        let free = shared.failures.memory();
+        shared.timeline = free
+            .and_then(|()| device.create_semaphore(&semaphore, None))
+            .map_err(device_error("timeline semaphore"))?;
+        let pool = vk::CommandPoolCreateInfo::default().queue_family_index(family);
+        let free = shared.failures.memory();
+        shared.pool = free
+            .and_then(|()| device.create_command_pool(&pool, None))
+            .map_err(device_error("command pool"))?;
+        let allocator = Allocator::new(&AllocatorCreateDesc {
             instance,
-            _entry: entry,
+            device: device.clone(),
+            physical_device: physical,
+            debug_settings: Default::default(),
+            buffer_device_address: false,
+            allocation_sizes: Default::default(),
         })
+        .map_err(|e| Error::Device(format!("allocator: {e}")))?;
+        shared.allocator = Mutex::new(Some(allocator));
+        for sampler in Sampler::ALL {
+            let made = shared.failures.memory().and_then(|()| sampler.make(&device));
+            shared.samplers.push(made.map_err(device_error("sampler"))?);
+        }
+        Ok(shared)
     }
 }
 
@@ -367,6 +421,13 @@ impl Shared {
         let types = &self.memory.memory_types[..self.memory.memory_type_count as usize];
         let found = types.iter().find(|t| t.property_flags == allocation.memory_properties());
         found.map_or(0, |t| t.heap_index as usize)
+    }
+
+    /// Waits until the device has nothing to do.
+    pub fn wait_idle(&self) -> std::result::Result<(), vk::Result> {
+        // SAFETY: the device is alive; no other thread submits. A device that only plays lost is waited for all the same.
+        let done = unsafe { self.device.device_wait_idle() };
+        self.failures.device().and(done)
     }
 
     /// Keeps a resource until the submission that may still use it is done.
@@ -392,9 +453,10 @@ impl Shared {
 impl Drop for Shared {
     fn drop(&mut self) {
         // SAFETY: this is the last owner, so no resource, recorder or other thread uses the device; children go
-        // before the device, the device before the instance.
+        // before the device, the device before the instance, which is the last field.
         unsafe {
-            let _ = self.device.device_wait_idle();
+            // A lost device has nothing left to wait for.
+            let _ = self.wait_idle();
             self.collect(u64::MAX);
             drop(lock(&self.allocator).take());
             self.timing.destroy(&self.device);
@@ -404,10 +466,6 @@ impl Drop for Shared {
             self.device.destroy_command_pool(self.pool, None);
             self.device.destroy_semaphore(self.timeline, None);
             self.device.destroy_device(None);
-            if let Some((debug, messenger)) = self.messenger.take() {
-                debug.destroy_debug_utils_messenger(messenger, None);
-            }
-            self.instance.destroy_instance(None);
         }
     }
 }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use ash::vk;
-use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use gpu_allocator::{AllocationError, MemoryLocation};
 
 use super::context::{Gpu, Shared, device_error, lock};
 use crate::{Error, Result};
@@ -119,7 +119,9 @@ impl Gpu {
         let create = vk::BufferCreateInfo::default().size(bytes).usage(usage);
         // SAFETY: the device is alive; on failure the handle is destroyed before returning.
         unsafe {
-            let handle = s.device.create_buffer(&create, None).map_err(device_error(name))?;
+            let free = s.failures.memory();
+            let handle =
+                free.and_then(|()| s.device.create_buffer(&create, None)).map_err(device_error(name))?;
             let requirements = s.device.get_buffer_memory_requirements(handle);
             let allocation = match self.allocate(name, requirements, location, true) {
                 Ok(a) => a,
@@ -128,7 +130,9 @@ impl Gpu {
                     return Err(e);
                 }
             };
-            let bound = s.device.bind_buffer_memory(handle, allocation.memory(), allocation.offset());
+            let free = s.failures.memory();
+            let bound = free
+                .and_then(|()| s.device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()));
             s.name(handle, name);
             let buffer = Buffer { shared: s.clone(), handle, allocation: Some(allocation), bytes };
             bound.map_err(device_error(name))?;
@@ -203,7 +207,9 @@ impl Gpu {
         };
         // SAFETY: the device is alive; on failure the handles made so far are destroyed before returning.
         let image = unsafe {
-            let handle = s.device.create_image(&create, None).map_err(device_error(d.name))?;
+            let free = s.failures.memory();
+            let handle =
+                free.and_then(|()| s.device.create_image(&create, None)).map_err(device_error(d.name))?;
             let requirements = s.device.get_image_memory_requirements(handle);
             let allocation = match self.allocate(d.name, requirements, MemoryLocation::GpuOnly, false) {
                 Ok(a) => a,
@@ -212,13 +218,17 @@ impl Gpu {
                     return Err(e);
                 }
             };
-            let bound = s.device.bind_image_memory(handle, allocation.memory(), allocation.offset());
+            let free = s.failures.memory();
+            let bound = free
+                .and_then(|()| s.device.bind_image_memory(handle, allocation.memory(), allocation.offset()));
             let view = vk::ImageViewCreateInfo::default()
                 .image(handle)
                 .view_type(view_kind)
                 .format(d.format)
                 .subresource_range(whole(aspect));
-            let view = bound.and_then(|()| s.device.create_image_view(&view, None));
+            let view = bound
+                .and_then(|()| s.failures.memory())
+                .and_then(|()| s.device.create_image_view(&view, None));
             let mut image = Image {
                 shared: s.clone(),
                 handle,
@@ -243,9 +253,9 @@ impl Gpu {
                         .view_type(vk::ImageViewType::TYPE_2D_ARRAY)
                         .format(d.format)
                         .subresource_range(range);
-                    image
-                        .level_views
-                        .push(s.device.create_image_view(&one, None).map_err(device_error(d.name))?);
+                    let free = s.failures.memory();
+                    let made = free.and_then(|()| s.device.create_image_view(&one, None));
+                    image.level_views.push(made.map_err(device_error(d.name))?);
                 }
             }
             image
@@ -273,6 +283,8 @@ impl Gpu {
         location: MemoryLocation,
         linear: bool,
     ) -> Result<Allocation> {
+        let what = format!("{name}, {} bytes", requirements.size);
+        self.shared.failures.memory().map_err(device_error(&what))?;
         let mut guard = lock(&self.shared.allocator);
         let allocator = guard.as_mut().ok_or_else(|| Error::Device("the device is closing".into()))?;
         let allocation = allocator
@@ -283,7 +295,10 @@ impl Gpu {
                 linear,
                 allocation_scheme: AllocationScheme::GpuAllocatorManaged,
             })
-            .map_err(|e| Error::Device(format!("{name}, {} bytes: {e}", requirements.size)))?;
+            .map_err(|e| match e {
+                AllocationError::OutOfMemory => device_error(&what)(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY),
+                other => Error::Device(format!("{what}: {other}")),
+            })?;
         lock(&self.shared.heap_bytes)[self.shared.heap_of(&allocation)] += allocation.size();
         Ok(allocation)
     }

@@ -10,6 +10,7 @@
 
 mod capture;
 mod context;
+mod failures;
 pub mod interface;
 mod memory;
 mod program;
@@ -21,6 +22,8 @@ mod transfer;
 pub use ash::vk;
 pub use capture::FrameCapture;
 pub use context::{Gpu, GpuOptions, Validation};
+#[doc(hidden)]
+pub use failures::Failure;
 pub use memory::{Buffer, Image, ImageDesc};
 pub use program::{DepthTest, GraphicsDesc, Program, Sampler};
 #[doc(hidden)]

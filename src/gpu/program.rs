@@ -27,12 +27,10 @@ pub enum Sampler {
 impl Sampler {
     pub(super) const ALL: [Sampler; 5] =
         [Sampler::Nearest, Sampler::Linear, Sampler::LinearBorder, Sampler::LinearRepeat, Sampler::Trilinear];
-}
 
-pub(super) fn make_samplers(device: &ash::Device) -> Result<Vec<vk::Sampler>> {
-    let make = |s: &Sampler| {
-        let filter = if *s == Sampler::Nearest { vk::Filter::NEAREST } else { vk::Filter::LINEAR };
-        let address = match s {
+    pub(super) fn make(self, device: &ash::Device) -> std::result::Result<vk::Sampler, vk::Result> {
+        let filter = if self == Sampler::Nearest { vk::Filter::NEAREST } else { vk::Filter::LINEAR };
+        let address = match self {
             Sampler::LinearBorder => vk::SamplerAddressMode::CLAMP_TO_BORDER,
             Sampler::LinearRepeat => vk::SamplerAddressMode::REPEAT,
             _ => vk::SamplerAddressMode::CLAMP_TO_EDGE,
@@ -40,7 +38,7 @@ pub(super) fn make_samplers(device: &ash::Device) -> Result<Vec<vk::Sampler>> {
         let create = vk::SamplerCreateInfo::default()
             .mag_filter(filter)
             .min_filter(filter)
-            .mipmap_mode(if *s == Sampler::Trilinear {
+            .mipmap_mode(if self == Sampler::Trilinear {
                 vk::SamplerMipmapMode::LINEAR
             } else {
                 vk::SamplerMipmapMode::NEAREST
@@ -51,9 +49,8 @@ pub(super) fn make_samplers(device: &ash::Device) -> Result<Vec<vk::Sampler>> {
             .max_lod(vk::LOD_CLAMP_NONE)
             .border_color(vk::BorderColor::FLOAT_TRANSPARENT_BLACK);
         // SAFETY: the device is alive.
-        unsafe { device.create_sampler(&create, None) }.map_err(device_error("sampler"))
-    };
-    Sampler::ALL.iter().map(make).collect()
+        unsafe { device.create_sampler(&create, None) }
+    }
 }
 
 /// A pipeline and what binding to it needs.
@@ -111,10 +108,12 @@ impl Gpu {
             .name(c"main")
             .specialization_info(&special);
         let create = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(program.layout)];
-        // SAFETY: module and layout are alive.
-        let made =
-            unsafe { self.shared.device.create_compute_pipelines(vk::PipelineCache::null(), &create, None) };
-        program.pipeline = made.map_err(|(_, e)| e).map_err(device_error(shader.name))?[0];
+        let (s, none) = (&self.shared, vk::PipelineCache::null());
+        let made = s.failures.memory().and_then(|()| {
+            // SAFETY: module and layout are alive.
+            unsafe { s.device.create_compute_pipelines(none, &create, None) }.map_err(|(_, e)| e)
+        });
+        program.pipeline = made.map_err(device_error(shader.name))?[0];
         self.shared.name(program.pipeline, shader.name);
         Ok(program)
     }
@@ -172,10 +171,12 @@ impl Gpu {
             .dynamic_state(&dynamic)
             .layout(program.layout)
             .push_next(&mut rendering)];
-        // SAFETY: modules, layout and every state struct are alive.
-        let made =
-            unsafe { self.shared.device.create_graphics_pipelines(vk::PipelineCache::null(), &create, None) };
-        program.pipeline = made.map_err(|(_, e)| e).map_err(device_error(d.frag.name))?[0];
+        let (s, none) = (&self.shared, vk::PipelineCache::null());
+        let made = s.failures.memory().and_then(|()| {
+            // SAFETY: modules, layout and every state struct are alive.
+            unsafe { s.device.create_graphics_pipelines(none, &create, None) }.map_err(|(_, e)| e)
+        });
+        program.pipeline = made.map_err(device_error(d.frag.name))?[0];
         self.shared.name(program.pipeline, d.frag.name);
         Ok(program)
     }
@@ -215,27 +216,26 @@ impl Gpu {
         let ranges = [vk::PushConstantRange::default().stage_flags(stage_flags).offset(0).size(push_bytes)];
         // SAFETY: the device is alive; the set layout outlives the pipeline layout.
         unsafe {
-            let set = s
-                .device
-                .create_descriptor_set_layout(
-                    &vk::DescriptorSetLayoutCreateInfo::default()
-                        .flags(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
-                        .bindings(&layout),
-                    None,
-                )
+            let create = vk::DescriptorSetLayoutCreateInfo::default()
+                .flags(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
+                .bindings(&layout);
+            let free = s.failures.memory();
+            let set = free
+                .and_then(|()| s.device.create_descriptor_set_layout(&create, None))
                 .map_err(device_error("descriptor set layout"))?;
             let sets = [set];
             let mut create = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
             if push_bytes > 0 {
                 create = create.push_constant_ranges(&ranges);
             }
-            let layout = match s.device.create_pipeline_layout(&create, None) {
-                Ok(l) => l,
-                Err(e) => {
-                    s.device.destroy_descriptor_set_layout(set, None);
-                    return Err(device_error("pipeline layout")(e));
-                }
-            };
+            let layout =
+                match s.failures.memory().and_then(|()| s.device.create_pipeline_layout(&create, None)) {
+                    Ok(l) => l,
+                    Err(e) => {
+                        s.device.destroy_descriptor_set_layout(set, None);
+                        return Err(device_error("pipeline layout")(e));
+                    }
+                };
             Ok(Program {
                 shared: s.clone(),
                 name: stages[stages.len() - 1].name,
@@ -274,8 +274,10 @@ impl<'a> Module<'a> {
     fn new(shared: &'a Shared, shader: &Shader) -> Result<Self> {
         let words = bytemuck::pod_collect_to_vec::<u8, u32>(shader.spirv);
         let create = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: the words are SPIR-V from glslang.
-        let handle = unsafe { shared.device.create_shader_module(&create, None) };
+        let handle = shared.failures.memory().and_then(|()| {
+            // SAFETY: the words are SPIR-V from glslang.
+            unsafe { shared.device.create_shader_module(&create, None) }
+        });
         Ok(Module { shared, handle: handle.map_err(device_error(shader.name))? })
     }
 }

@@ -133,8 +133,13 @@ impl Gpu {
         let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         // SAFETY: the command buffer is complete and its resources are alive until the wait returns.
         unsafe {
-            s.device.queue_submit(s.queue, &submit, vk::Fence::null()).map_err(device_error("submit"))?;
-            s.device.wait_semaphores(&wait, u64::MAX).map_err(device_error("waiting for the device"))?;
+            let works = s.failures.memory().and_then(|()| s.failures.device());
+            works
+                .and_then(|()| s.device.queue_submit(s.queue, &submit, vk::Fence::null()))
+                .map_err(device_error("submit"))?;
+            // A device that only plays lost is waited for all the same: it has the commands.
+            let done = s.device.wait_semaphores(&wait, u64::MAX);
+            s.failures.device().and(done).map_err(device_error("waiting for the device"))?;
         }
         s.collect(value);
         Ok(())
@@ -156,9 +161,12 @@ impl<'g> Recorder<'g> {
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the pool is used by this thread only while the recorder borrows the Gpu; `Drop` frees the buffer.
         unsafe {
-            let cmd = s.device.allocate_command_buffers(&allocate);
+            let free = s.failures.memory();
+            let cmd = free.and_then(|()| s.device.allocate_command_buffers(&allocate));
             self.cmd = cmd.map_err(device_error("command buffer"))?[0];
-            s.device.begin_command_buffer(self.cmd, &begin).map_err(device_error("recording"))
+            let free = s.failures.memory();
+            free.and_then(|()| s.device.begin_command_buffer(self.cmd, &begin))
+                .map_err(device_error("recording"))
         }
     }
 
@@ -168,8 +176,11 @@ impl<'g> Recorder<'g> {
         let start = monotonic_ns();
         self.submitted.get_or_insert(start);
         let cpu = process_cpu_ns();
-        // SAFETY: every pass is closed; the buffer is freed after the wait, or by `Drop`.
-        unsafe { s.device.end_command_buffer(self.cmd) }.map_err(device_error("recording"))?;
+        let ended = s.failures.memory().and_then(|()| {
+            // SAFETY: every pass is closed; the buffer is freed after the wait, or by `Drop`.
+            unsafe { s.device.end_command_buffer(self.cmd) }
+        });
+        ended.map_err(device_error("recording"))?;
         self.gpu.submit(self.cmd)?;
         let cpu = process_cpu_ms_since(cpu);
         self.waited += monotonic_ns() - start;

@@ -212,8 +212,9 @@ impl Gpu {
         let counts = pool(vk::QueryType::PIPELINE_STATISTICS, MAX_SCOPES).pipeline_statistics(counters());
         // SAFETY: the device is alive and has the feature if statistics are wanted; on failure the first pool goes too.
         unsafe {
-            let stamps = s.device.create_query_pool(&stamps, None).map_err(device_error("timestamps"))?;
-            let statistics = statistics.then(|| s.device.create_query_pool(&counts, None)).transpose();
+            let make = |pool| s.failures.memory().and_then(|()| s.device.create_query_pool(pool, None));
+            let stamps = make(&stamps).map_err(device_error("timestamps"))?;
+            let statistics = statistics.then(|| make(&counts)).transpose();
             match statistics {
                 Ok(statistics) => Ok(Queries { stamps, statistics }),
                 Err(e) => {

@@ -129,15 +129,18 @@ impl Gpu {
         // SAFETY: the pool is used by one thread at a time (the recorder borrows the Gpu on this one); the command
         // buffer is freed only after the wait.
         unsafe {
-            let cmd =
-                s.device.allocate_command_buffers(&allocate).map_err(device_error("command buffer"))?[0];
+            let free = s.failures.memory();
+            let cmd = free
+                .and_then(|()| s.device.allocate_command_buffers(&allocate))
+                .map_err(device_error("command buffer"))?[0];
             let begin =
                 vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-            let recorded = s.device.begin_command_buffer(cmd, &begin).and_then(|()| {
+            let free = s.failures.memory();
+            let recorded = free.and_then(|()| s.device.begin_command_buffer(cmd, &begin)).and_then(|()| {
                 super::record::barrier(&s.device, cmd);
                 record(&s.device, cmd);
                 super::record::barrier(&s.device, cmd);
-                s.device.end_command_buffer(cmd)
+                s.failures.memory().and_then(|()| s.device.end_command_buffer(cmd))
             });
             let done = recorded.map_err(device_error("recording")).and_then(|()| self.submit(cmd));
             s.device.free_command_buffers(s.pool, &[cmd]);

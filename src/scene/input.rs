@@ -11,11 +11,12 @@ use crate::{Error, Result};
 /// Errors: [`Error::Io`] if it cannot be read, [`Error::Input`] if it is no regular file or too large.
 pub(crate) fn read_bytes(path: &Path, limit: u64) -> Result<Vec<u8>> {
     let io = |e| Error::io(path, e);
-    let mut file = File::open(path).map_err(io)?;
-    let meta = file.metadata().map_err(io)?;
+    // Asked before it is opened: opening a pipe would wait for a writer.
+    let meta = path.metadata().map_err(io)?;
     if !meta.is_file() {
         return Err(Error::input(path, "", "this is not a regular file", "name a file"));
     }
+    let mut file = File::open(path).map_err(io)?;
     let too_large = |length: u64| {
         let what = format!("the file has {length} bytes; at most {limit} are read");
         Error::input(path, "", what, "use a smaller file")
@@ -37,6 +38,35 @@ pub(crate) fn read_text(path: &Path, limit: u64) -> Result<String> {
     String::from_utf8(read_bytes(path, limit)?).map_err(|e| {
         let place = format!("byte {}", e.utf8_error().valid_up_to());
         Error::input(path, place, "the text is not valid UTF-8", "save the file as UTF-8")
+    })
+}
+
+/// How many bytes of image a byte of file can hold: Deflate reaches 1032, LZW 1340, JPEG less.
+const MAX_EXPANSION: u64 = 2048;
+
+/// Refuses an image of `needed` decoded bytes that a file of `bytes` cannot hold, before memory is set aside for it: a
+/// few damaged bytes in a header would otherwise ask for gigabytes.
+///
+/// Errors: [`Error::Input`] with the size that the header announces.
+pub(crate) fn check_content(
+    path: &Path,
+    place: &str,
+    bytes: usize,
+    (width, height): (u64, u64),
+    needed: u64,
+) -> Result<()> {
+    if needed <= (bytes as u64).saturating_mul(MAX_EXPANSION) {
+        return Ok(());
+    }
+    let what = format!("the header announces {width} × {height}, but there are only {bytes} bytes");
+    Err(Error::input(path, place, what, "the image is damaged or truncated; write it again"))
+}
+
+/// Decodes an image. Decoders of others have been seen to panic on damaged files: that is the file's fault, not the end of
+/// the program.
+pub(crate) fn decoded<T>(path: &Path, place: &str, decode: impl FnOnce() -> Result<T>) -> Result<T> {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(decode)).unwrap_or_else(|_| {
+        Err(Error::input(path, place, "the decoder gave up on this image", "it is damaged; write it again"))
     })
 }
 

@@ -10,7 +10,7 @@ use tiff::decoder::DecodingResult;
 use tiff::tags::Tag;
 
 use super::Raster;
-use super::input::read_bytes;
+use super::input::{check_content, read_bytes};
 use crate::{Error, Result};
 
 /// Most samples along a side of a raster.
@@ -116,6 +116,7 @@ fn decode_png(path: &Path, bytes: &[u8]) -> Result<Grey> {
     if !matches!(color, image::ColorType::L8 | image::ColorType::L16) {
         return Err(not_grey(path, format!("{color:?}")));
     }
+    check_content(path, "", bytes.len(), (width.into(), height.into()), decoder.total_bytes())?;
     let samples = match image::DynamicImage::from_decoder(decoder).map_err(bad)? {
         image::DynamicImage::ImageLuma8(i) => Samples::U8(i.into_raw()),
         image::DynamicImage::ImageLuma16(i) => Samples::U16(i.into_raw()),
@@ -130,9 +131,11 @@ fn decode_tiff(path: &Path, bytes: &[u8]) -> Result<Grey> {
     let (width, height) = decoder.dimensions().map_err(bad)?;
     check_side(path, width, height)?;
     let color = decoder.colortype().map_err(bad)?;
-    if !matches!(color, tiff::ColorType::Gray(8 | 16 | 32)) {
+    let tiff::ColorType::Gray(bits @ (8 | 16 | 32)) = color else {
         return Err(not_grey(path, format!("{color:?}")));
-    }
+    };
+    let size = (u64::from(width), u64::from(height));
+    check_content(path, "", bytes.len(), size, size.0 * size.1 * u64::from(bits / 8))?;
     let mut limits = tiff::decoder::Limits::default();
     // Exactly this image: four bytes a sample, and a strip or tile as large as the whole.
     limits.decoding_buffer_size = width as usize * height as usize * 4;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use image::{ImageDecoder, ImageFormat, ImageReader};
 
-use super::input::read_bytes;
+use super::input::{check_content, decoded, read_bytes};
 use super::{Sky, Texture};
 use crate::{Error, Result};
 
@@ -45,7 +45,9 @@ pub fn decode_texture(file: &Path, place: &str, bytes: &[u8]) -> Result<Texture>
     let decoder = reader.into_decoder().map_err(bad)?;
     let (width, height) = decoder.dimensions();
     check_side(file, place, width.into(), height.into())?;
-    let rgba = image::DynamicImage::from_decoder(decoder).map_err(bad)?.into_rgba8().into_raw();
+    check_content(file, place, bytes.len(), (width.into(), height.into()), decoder.total_bytes())?;
+    let decode = || Ok(image::DynamicImage::from_decoder(decoder).map_err(bad)?.into_rgba8().into_raw());
+    let rgba = decoded(file, place, decode)?;
     Ok(Texture { width, height, rgba })
 }
 
@@ -92,16 +94,24 @@ fn decode_hdr(path: &Path, bytes: &[u8]) -> Result<(u32, u32, Vec<f32>)> {
     let decoder = image::codecs::hdr::HdrDecoder::new(Cursor::new(bytes)).map_err(bad)?;
     let (width, height) = decoder.dimensions();
     check_sky(path, width.into(), height.into())?;
+    check_content(path, "", bytes.len(), (width.into(), height.into()), decoder.total_bytes())?;
     let pixels = image::DynamicImage::from_decoder(decoder).map_err(bad)?.into_rgb32f().into_raw();
     Ok((width, height, pixels))
 }
 
 fn decode_exr(path: &Path, bytes: &[u8]) -> Result<(u32, u32, Vec<f32>)> {
-    use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel};
+    use exr::prelude::{Compression, ReadChannels, ReadLayers, ReadSpecificChannel};
     let bad = |e: exr::error::Error| Error::input(path, "", e.to_string(), "write the image again");
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(bad)?;
     for header in &meta.headers {
-        check_sky(path, header.layer_size.width() as u64, header.layer_size.height() as u64)?;
+        let (width, height) = (header.layer_size.width() as u64, header.layer_size.height() as u64);
+        check_sky(path, width, height)?;
+        // The decoder of these overflows on damaged blocks, and not on a thread of ours where that could be caught.
+        if matches!(header.compression, Compression::B44 | Compression::B44A) {
+            let what = format!("the compression is {}", header.compression);
+            return Err(Error::input(path, "", what, "write the image with ZIP, PIZ or no compression"));
+        }
+        check_content(path, "", bytes.len(), (width, height), width * height * 12)?;
     }
     let image = exr::prelude::read()
         .no_deep_data()

@@ -9,6 +9,7 @@ use canopy::gpu::interface::Seed;
 use canopy::gpu::{Gpu, GpuOptions, Resource, Shader, Validation};
 use canopy::measure::conform::probe;
 pub use canopy::measure::conform::probe::{Arguments, Function, Words, float, words};
+use canopy::physics::hash::Stream;
 use canopy::plan::Plan;
 use canopy::scene::{self, Camera, Scene};
 
@@ -64,12 +65,14 @@ pub fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR"))
 }
 
+/// What makes a scene coarse, small and so quick to bake and draw.
+const SMALL: &str = "\n[quality]\npreset = \"fast\"\nview_rings = 2\nview_resolution = 32\nocclusion_rays = 8\n\
+                     cascade_size = 256\ncoverage_size = 64\n\
+                     table_angles = 6\ntable_densities = 3\ntable_rays = 64\n";
+
 /// A scene from text, with coarse views and small shadow maps so that it is quick to bake and draw.
 pub fn small_scene(text: &str) -> Scene {
-    let quality = "\n[quality]\npreset = \"fast\"\nview_rings = 2\nview_resolution = 32\nocclusion_rays = 8\n\
-                   cascade_size = 256\ncoverage_size = 64\n\
-                   table_angles = 6\ntable_densities = 3\ntable_rays = 64\n";
-    scene::parse(&format!("{text}{quality}"), Path::new("test.toml")).unwrap()
+    scene::parse(&format!("{text}{SMALL}"), Path::new("test.toml")).unwrap()
 }
 
 /// Species of a scene, baked once for all tests and runs.
@@ -92,4 +95,44 @@ pub fn renderer(gpu: &Gpu, scene: &Scene, camera: &Camera, size: [u32; 2], layer
 /// A camera of 50 degrees.
 pub fn camera(position: [f64; 3], target: [f64; 3]) -> Camera {
     Camera { name: "test".into(), position, target, vertical_fov: 50.0 }
+}
+
+/// Where a soak's camera stands in a frame: anywhere over and beyond the terrain, looking anywhere, never the same twice.
+pub fn jump(scene: &Scene, frame: u32) -> Camera {
+    let mut stream = Stream::new(frame);
+    let mut within = |low: f64, high: f64| low + (high - low) * stream.unit();
+    let [width, height] = scene.terrain.extent;
+    let eye =
+        [within(-0.1, 1.1) * width, within(-0.1, 1.1) * height, within(0.1f64.ln(), 3000f64.ln()).exp()];
+    let [x, y, _] = eye;
+    camera(eye, [x + within(-300.0, 300.0), y + within(-300.0, 300.0), within(-200.0, 200.0)])
+}
+
+/// Two species on ridges, for soaks.
+pub const WOODS: &str = "[terrain]\nheightmap = \"builtin:ridge\"\n[[species]]\nname = \"oak\"\nmodel = \"builtin:oak\"\n\
+    density = 0.02\n[[species]]\nname = \"pine\"\nmodel = \"builtin:pine\"\ndensity = 0.01\nbelow_slope = 30.0\n\
+    [sun]\nazimuth = 180.0\nelevation = 40.0\nirradiance = 1.0\n[sky]\nradiance = 0.1\n\
+    [[camera]]\nname = \"a\"\nposition = [0.0, 0.0, 10.0]\ntarget = [9.0, 9.0, 5.0]\nvertical_fov = 50.0\n";
+
+/// Draws frames from cameras that jump at random, and passes the number of each on to `after`. What lives on the device
+/// must stay what it was after the first: a frame leaves at most its last read-back behind for the next to free, and
+/// lists of quads grow by a per cent.
+pub fn soak(gpu: &Gpu, scene: &Scene, frames: u32, mut after: impl FnMut(u32)) {
+    let mut renderer = renderer(gpu, scene, &jump(scene, 0), [96, 64], false);
+    let bytes = |report: &[(String, u64)]| report.iter().map(|(_, bytes)| bytes).sum::<u64>();
+    let mut first = Vec::new();
+    for frame in 0..frames {
+        renderer.render(&jump(scene, frame), 1.0).unwrap();
+        let now = gpu.memory_report();
+        if frame == 0 {
+            first = now;
+        } else {
+            assert!(now.len() <= first.len() + 2, "frame {frame}: {now:?} where there was {first:?}");
+            assert!(
+                100 * bytes(&now) <= 101 * bytes(&first),
+                "frame {frame}: {now:?} where there was {first:?}"
+            );
+        }
+        after(frame);
+    }
 }

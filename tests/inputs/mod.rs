@@ -43,12 +43,17 @@ pub fn png(width: u32, height: u32) -> Vec<u8> {
     out.into_inner()
 }
 
-/// A PNG whose header announces 60000 × 60000 pixels, with the right checksum and nothing behind it.
+/// A PNG whose header announces more pixels than anyone reads, with the right checksum and nothing behind it.
 pub fn huge_png() -> Vec<u8> {
+    hollow_png(60000)
+}
+
+/// A PNG whose header announces so many pixels a side, with the right checksum and nothing behind it.
+pub fn hollow_png(side: u32) -> Vec<u8> {
     let mut out = b"\x89PNG\r\n\x1a\n\0\0\0\x0d".to_vec();
     let mut header = b"IHDR".to_vec();
-    header.extend(60000u32.to_be_bytes());
-    header.extend(60000u32.to_be_bytes());
+    header.extend(side.to_be_bytes());
+    header.extend(side.to_be_bytes());
     header.extend([8, 0, 0, 0, 0]);
     let crc = header.iter().fold(!0u32, |crc, b| {
         (0..8).fold(crc ^ u32::from(*b), |c, _| if c & 1 == 1 { (c >> 1) ^ 0xedb8_8320 } else { c >> 1 })

@@ -13,6 +13,7 @@ mod planted;
 mod plot;
 mod popping;
 mod scale;
+mod soak;
 
 use std::path::PathBuf;
 

@@ -10,6 +10,9 @@ use super::MAX_ELEMENTS;
 use super::buffers::Buffers;
 use crate::{Error, Result};
 
+/// Most entries for each one that a sparse accessor without a view holds.
+const MAX_ZEROS: usize = 1024;
+
 /// Reads the accessors of one primitive.
 pub(super) struct Reader<'a> {
     /// The model, for messages.
@@ -158,6 +161,12 @@ impl Reader<'_> {
             if replaced == 0 || replaced > count {
                 let what = format!("the accessor replaces {replaced} of its {count} entries");
                 return Err(self.error(index, what, "export the model again"));
+            }
+            // Without a view the others are zeros that the file does not hold: any number of them, for a few bytes.
+            if accessor.view().is_none() && count / MAX_ZEROS > replaced {
+                let what =
+                    format!("the accessor has no bufferView and only {replaced} of its {count} entries");
+                return Err(self.error(index, what, "export the model again, without sparse accessors"));
             }
             let indices = sparse.indices();
             self.span(index, &indices.view(), indices.offset(), replaced, indices.index_type().size())?;
