@@ -41,7 +41,7 @@
 //! | BN12 §9, figures 7 and 8 | [`measure::reflectance`] | | `tests/proofs/scale.rs`, `tests/cli.rs` |
 //! | BN12 §8, culling in order | [`forest::cull`] | `forest/cull.comp`, `forest/scan.comp`, `forest/compact.comp` | `tests/gpu/cull.rs` |
 //! | BN12 §7, trees on silhouettes beyond the hand-over | [`forest::silhouette`] | `forest/silhouette.glsl` | `tests/gpu/silhouettes.rs` |
-//! | BN12 §8, sub-pixel masks | [`physics::masks`] | `physics/masks.glsl` | `tests/gpu/masks.rs` |
+//! | BN12 §8, sub-pixel masks | [`physics::masks`] | `physics/masks.glsl` | `measure/conform/law.rs`, `tests/conform.rs` |
 //! | parallel-split shadow maps (Zhang et al. 2006) | [`frame::cascades`], [`frame::shadows`] | `frame/tree_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
 //! | trees that need no file (Weber and Penn 1995) | [`tree`] | | `tests/trees.rs` |
 //! | the scene file | [`scene`] | | `tests/scene_inputs.rs`, `tests/model_inputs.rs` |

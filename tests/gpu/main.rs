@@ -13,7 +13,6 @@ mod ground;
 mod handover;
 mod light;
 mod light_on_ground;
-mod masks;
 mod plan;
 mod seeds;
 mod shader_map;
