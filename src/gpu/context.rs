@@ -82,6 +82,8 @@ pub(super) struct Shared {
     pub heap_bytes: Mutex<[u64; vk::MAX_MEMORY_HEAPS]>,
     pub samplers: Vec<vk::Sampler>,
     pub info: DeviceInfo,
+    /// Descriptor sets come from pools instead of being pushed.
+    pub pool_sets: bool,
     pub timing: TimingState,
     pub failures: Failures,
     // Last: the instance must outlive everything made through it.
@@ -191,7 +193,8 @@ impl Gpu {
             root.messenger = Some(listen(&root._entry, &instance, &root.messages)?);
         }
         let (physical, info) = choose(&instance, options.device.as_deref())?;
-        let shared = open(root, physical, info, debug_utils, failures)?;
+        let mut shared = open(root, physical, info, debug_utils, failures)?;
+        shared.pool_sets = options.validation == Validation::GpuAssisted;
         Ok(Gpu { shared: Arc::new(shared) })
     }
 
@@ -375,6 +378,7 @@ fn open(
             samplers: Vec::new(),
             info,
             failures,
+            pool_sets: false,
             root,
         };
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);

@@ -56,6 +56,7 @@ pub(super) enum Retired {
     Buffer(vk::Buffer, Allocation),
     Image(vk::Image, Vec<vk::ImageView>, Allocation),
     Program(vk::Pipeline, vk::PipelineLayout, vk::DescriptorSetLayout),
+    Pool(vk::DescriptorPool),
 }
 
 impl Retired {
@@ -74,6 +75,10 @@ impl Retired {
                     }
                     shared.device.destroy_image(i, None);
                     a
+                }
+                Retired::Pool(pool) => {
+                    shared.device.destroy_descriptor_pool(pool, None);
+                    return;
                 }
                 Retired::Program(p, l, s) => {
                     shared.device.destroy_pipeline(p, None);

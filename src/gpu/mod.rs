@@ -16,6 +16,7 @@ mod memory;
 mod program;
 mod record;
 mod select;
+mod sets;
 mod timing;
 mod transfer;
 

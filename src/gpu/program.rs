@@ -59,7 +59,7 @@ pub struct Program {
     name: &'static str,
     pub(super) pipeline: vk::Pipeline,
     pub(super) layout: vk::PipelineLayout,
-    set: vk::DescriptorSetLayout,
+    pub(super) set: vk::DescriptorSetLayout,
     pub(super) bindings: Vec<Binding>,
     pub(super) stages: vk::ShaderStageFlags,
     pub(super) push_bytes: u32,
@@ -216,9 +216,11 @@ impl Gpu {
         let ranges = [vk::PushConstantRange::default().stage_flags(stage_flags).offset(0).size(push_bytes)];
         // SAFETY: the device is alive; the set layout outlives the pipeline layout.
         unsafe {
-            let create = vk::DescriptorSetLayoutCreateInfo::default()
-                .flags(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
-                .bindings(&layout);
+            let pushed = match s.pool_sets {
+                true => vk::DescriptorSetLayoutCreateFlags::empty(),
+                false => vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR,
+            };
+            let create = vk::DescriptorSetLayoutCreateInfo::default().flags(pushed).bindings(&layout);
             let free = s.failures.memory();
             let set = free
                 .and_then(|()| s.device.create_descriptor_set_layout(&create, None))

@@ -8,6 +8,7 @@ use bytemuck::Pod;
 use super::context::{Gpu, device_error};
 use super::memory::{Buffer, Image};
 use super::program::{Program, Sampler};
+use super::sets;
 use super::timing::{MAX_SCOPES, Queries, Scope, Timing, TimingOptions};
 use crate::clock::{monotonic_ns, process_cpu_ms_since, process_cpu_ns};
 use crate::{Error, Result};
@@ -471,7 +472,12 @@ impl Work<'_, '_> {
         // dropping only retires them.
         unsafe {
             s.device.cmd_bind_pipeline(self.recorder.cmd, program.bind_point, program.pipeline);
-            if !writes.is_empty() {
+            if !writes.is_empty() && s.pool_sets {
+                if let Err(e) = sets::bind(s, self.recorder.cmd, program, &writes) {
+                    self.recorder.error.get_or_insert(device_error("descriptor set")(e));
+                    return;
+                }
+            } else if !writes.is_empty() {
                 let (cmd, layout) = (self.recorder.cmd, program.layout);
                 s.push.cmd_push_descriptor_set(cmd, program.bind_point, layout, 0, &writes);
             }
