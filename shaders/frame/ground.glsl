@@ -20,6 +20,7 @@ layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
 #include "frame/cover.glsl"
 #include "physics/handover.glsl"
 layout(constant_id = 5) const bool HAS_SUN = true;
+layout(constant_id = 6) const bool SHADOWED = true; // within reach of a cascade
 
 struct GroundLight {
     vec3 sun, sky;  // parts of the radiance
@@ -30,6 +31,7 @@ struct GroundLight {
 
 // How much of the sun the shadow maps leave.
 float shadow_maps(vec3 n, float cosine, float distance) {
+    if (!SHADOWED) return 1.0;
     uint c = cascade_at(view.v.cascade_far, view.v.cascade_count, distance);
     if (c == MAX_CASCADES) return 1.0;
     // Ground that curves within a texel would shade itself: half a texel towards the sun, more where the sun grazes.

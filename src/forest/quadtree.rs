@@ -138,6 +138,20 @@ impl Quadtree {
         [f64::from(min) - lobe, f64::from(max) + lobe]
     }
 
+    /// No point of a quad as it is drawn is nearer to `eye`, m. Where it morphs it has its parent's shape, which may leave its own
+    /// bounds, but not its parent's heights.
+    pub fn nearest(&self, quad: QuadKey, eye: [f64; 3]) -> f64 {
+        let rectangle = |q: QuadKey| {
+            let side = self.side(q.level);
+            let low = [f64::from(q.x) * side, f64::from(q.y) * side];
+            (low, [(low[0] + side).min(self.extent[0]), (low[1] + side).min(self.extent[1])])
+        };
+        let (low, high) = rectangle(quad);
+        let (parent_low, parent_high) = rectangle(quad.ancestor(quad.level.saturating_sub(1)));
+        let [min, max] = self.height_range(parent_low, parent_high);
+        Bounds { low: [low[0], low[1], min], high: [high[0], high[1], max] }.distance(eye)
+    }
+
     /// The quads to draw from `eye`, in order: those whose bounds `keep` keeps; `None` when there are more than `most`.
     pub fn select(
         &self,
@@ -297,5 +311,25 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn no_ground_of_a_quad_or_of_its_parent_in_it_is_nearer_than_said() {
+        let terrain = hills();
+        let tree = Quadtree::new(&terrain, f64::INFINITY);
+        let eye = [900.0, 400.0, 250.0];
+        let all = tree.select(eye, MIN_REFINE, 10_000, &|_| true).unwrap();
+        for quad in &all {
+            let (side, said) = (tree.side(quad.level), tree.nearest(*quad, eye));
+            for k in 0..81 {
+                let [u, v] = [k % 9, k / 9].map(|c| f64::from(c) / 8.0);
+                let x = ((f64::from(quad.x) + u) * side).min(tree.extent[0]);
+                let y = ((f64::from(quad.y) + v) * side).min(tree.extent[1]);
+                let z = crate::physics::terrain::height_at(&terrain, x, y);
+                let away = ((x - eye[0]).powi(2) + (y - eye[1]).powi(2) + (z - eye[2]).powi(2)).sqrt();
+                assert!(said <= away + 1e-9, "{quad:?}: {said} {away}");
+            }
+        }
+        assert!(all.iter().any(|q| tree.nearest(*q, eye) > 1000.0), "hardly anything is far");
     }
 }

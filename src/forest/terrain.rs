@@ -43,6 +43,8 @@ pub struct TerrainDraws {
     pub keys: Vec<QuadKey>,
     /// First and number of the camera's quads.
     pub camera: (u32, u32),
+    /// How many of them, the first, shadow cascades may reach.
+    pub shadowed: u32,
     /// The same for each cascade.
     pub cascades: Vec<(u32, u32)>,
     /// The same for tiles to produce.
@@ -151,10 +153,15 @@ impl TerrainData {
             let camera = select(&|b| b.touches(&planes, eye.position));
             let shadows: Option<Vec<_>> =
                 cascades.iter().map(|c| select(&|b| b.touches(&c.planes, eye.position))).collect();
-            if let (Some(camera), Some(shadows)) = (camera, shadows)
-                && let Some(draws) = self.assign(&camera, &shadows)
-            {
-                return Ok(draws);
+            if let (Some(camera), Some(shadows)) = (camera, shadows) {
+                let reach = cascades.last().map_or(0.0, |c| c.far);
+                let (mut near, far): (Vec<_>, Vec<_>) =
+                    camera.into_iter().partition(|q| self.tree.nearest(*q, eye.position) <= reach);
+                let shadowed = near.len() as u32;
+                near.extend(far);
+                if let Some(draws) = self.assign(&near, &shadows) {
+                    return Ok(TerrainDraws { shadowed, ..draws });
+                }
             }
             if refine <= MIN_REFINE {
                 return Err(Error::Usage(format!(

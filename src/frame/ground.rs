@@ -18,7 +18,8 @@ use crate::plan::{Plan, ViewMode};
 pub struct Ground {
     /// Indices of a quad's mesh.
     pub indices: Buffer,
-    program: Program,
+    /// For quads that shadow cascades reach, and for those beyond: their shader looks into no shadow map.
+    programs: [Program; 2],
     /// Stands for coverage tiles in scenes without trees.
     no_coverage: Image,
     no_nodes: Buffer,
@@ -37,9 +38,8 @@ impl Ground {
         // Diagonals run the same way at every level, so that a morphed quad is the coarser one exactly.
         let indices: Vec<u32> =
             cells.flat_map(|k| [k, k + 1, k + side + 1, k, k + side + 1, k + side]).collect();
-        Ok(Ground {
-            indices: gpu.buffer_with("terrain indices", &indices)?,
-            program: gpu.graphics(&GraphicsDesc {
+        let program = |shadowed: bool| {
+            gpu.graphics(&GraphicsDesc {
                 vert: &shaders::FRAME_TERRAIN_VERT,
                 frag: match plan.view_mode {
                     ViewMode::Radiance if plan.layers => &shaders::FRAME_TERRAIN_LAYERS_FRAG,
@@ -53,9 +53,14 @@ impl Ground {
                     (0, plan.cover_groups),
                     (1, (plan.coverage_size as f32).to_bits()),
                     (5, u32::from(plan.cascades > 0)),
+                    (6, u32::from(shadowed)),
                     (12, plan.view_mode as u32),
                 ],
-            })?,
+            })
+        };
+        Ok(Ground {
+            indices: gpu.buffer_with("terrain indices", &indices)?,
+            programs: [program(true)?, program(false)?],
             no_coverage: gpu.image(&ImageDesc {
                 name: "no coverage",
                 format: coverage::FORMAT,
@@ -97,21 +102,23 @@ impl Ground {
         let (tiles, nodes) =
             forest.map_or((&self.no_coverage, &self.no_nodes), |(f, map)| (&f.coverage.tiles, &map.nodes));
         recorder.render("terrain", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
-            pass.bind(
-                &self.program,
-                &[
-                    ("view", Resource::Buffer(view)),
-                    ("quads", Resource::Buffer(&terrain.quads)),
-                    ("height_tiles", Resource::Texture(&terrain.height_tiles, Sampler::Nearest)),
-                    ("slope_tiles", Resource::Texture(&terrain.slope_tiles, Sampler::Linear)),
-                    ("albedo", Resource::Texture(&terrain.albedo, Sampler::Linear)),
-                    ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
-                    ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
-                    ("nodes", Resource::Buffer(nodes)),
-                ],
-            );
-            pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
-            pass.draw_indexed(&self.indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, draws.camera.1);
+            let resources = [
+                ("view", Resource::Buffer(view)),
+                ("quads", Resource::Buffer(&terrain.quads)),
+                ("height_tiles", Resource::Texture(&terrain.height_tiles, Sampler::Nearest)),
+                ("slope_tiles", Resource::Texture(&terrain.slope_tiles, Sampler::Linear)),
+                ("albedo", Resource::Texture(&terrain.albedo, Sampler::Linear)),
+                ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+                ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
+                ("nodes", Resource::Buffer(nodes)),
+            ];
+            for (program, quads) in
+                self.programs.iter().zip([0..draws.shadowed, draws.shadowed..draws.camera.1])
+            {
+                pass.bind(program, &resources);
+                pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
+                pass.draw_indexed(&self.indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, quads);
+            }
         });
     }
 }

@@ -114,7 +114,7 @@ impl Shadows {
             for (c, (first, count)) in draws.cascades.iter().enumerate() {
                 let parameters = terrain.parameters(*first);
                 pass.push(&TerrainPush { parameters, cascade: c as u32 });
-                pass.draw_indexed(indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, *count);
+                pass.draw_indexed(indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, 0..*count);
             }
             let Some((cull, seeds, species)) = trees else { return };
             pass.bind(

@@ -579,14 +579,18 @@ impl RenderPass<'_, '_> {
         }
     }
 
-    /// Draws `count` 32-bit indices.
-    pub fn draw_indexed(&mut self, indices: &Buffer, count: u32, instances: u32) {
+    /// Draws `count` 32-bit indices for each of the instances.
+    pub fn draw_indexed(&mut self, indices: &Buffer, count: u32, instances: std::ops::Range<u32>) {
+        if instances.is_empty() {
+            return;
+        }
         let r = &mut *self.work.recorder;
         r.draws += 1;
         // SAFETY: the buffer is alive and holds `count` indices.
         unsafe {
             r.device().cmd_bind_index_buffer(r.cmd, indices.handle, 0, vk::IndexType::UINT32);
-            r.device().cmd_draw_indexed(r.cmd, count, instances, 0, 0, 0);
+            let number = instances.end - instances.start;
+            r.device().cmd_draw_indexed(r.cmd, count, number, 0, 0, instances.start);
         }
     }
 }
