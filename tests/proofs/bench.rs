@@ -119,7 +119,7 @@ fn a_build_is_itself_and_five_per_cent_are_found() {
     let (subject, path) = subject(&gpu);
     let timing = TimingOptions { stamps: true, apart: true, statistics: false };
     let request =
-        Request { path, step: 0.5, frames: 128, duration: 120.0, timing, pace: true, validate: false };
+        Request { path, step: 0.5, frames: 256, duration: 120.0, timing, pace: true, validate: false };
     let mut subjects = [subject];
     let runs: Vec<BenchResult> =
         (0..21).map(|_| run(&gpu, &mut subjects, &request, true).unwrap().swap_remove(0)).collect();
