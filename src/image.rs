@@ -71,22 +71,29 @@ impl Picture {
         Ok(Picture { size: plan.size, display, linear: linear.transpose()? })
     }
 
+    /// The display picture without alpha.
+    pub fn rgb(&self) -> Vec<u8> {
+        self.display.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
+    }
+
+    /// A hash of every bit.
+    pub fn digest(&self) -> String {
+        let mut h = blake3::Hasher::new();
+        h.update(&self.display);
+        if let Some(l) = &self.linear {
+            h.update(bytemuck::cast_slice(&l.sun)).update(bytemuck::cast_slice(&l.sky));
+            h.update(bytemuck::cast_slice(&l.depth)).update(bytemuck::cast_slice(&l.coverage));
+            h.update(bytemuck::cast_slice(&l.species)).update(bytemuck::cast_slice(&l.fractions));
+        }
+        h.finalize().to_hex().to_string()
+    }
+
     /// Writes the display picture as PNG.
     ///
     /// # Errors
     /// [`Error::Io`].
     pub fn write_png(&self, path: &Path) -> Result<()> {
-        let mut bytes = Vec::new();
-        let rgb: Vec<u8> = self.display.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-        let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
-        image::ImageEncoder::write_image(
-            encoder,
-            &rgb,
-            self.size[0],
-            self.size[1],
-            image::ExtendedColorType::Rgb8,
-        )
-        .map_err(|e| Error::io(path, std::io::Error::other(e)))?;
+        let bytes = png(&self.rgb(), self.size).map_err(|e| Error::io(path, std::io::Error::other(e)))?;
         write_whole(path, &bytes)
     }
 
@@ -144,4 +151,12 @@ impl Picture {
             .map_err(|e| Error::io(path, std::io::Error::other(e)))?;
         write_whole(path, bytes.get_ref())
     }
+}
+
+/// An RGB image as PNG.
+pub(crate) fn png(rgb: &[u8], [width, height]: [u32; 2]) -> image::ImageResult<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
+    image::ImageEncoder::write_image(encoder, rgb, width, height, image::ExtendedColorType::Rgb8)?;
+    Ok(bytes)
 }

@@ -138,16 +138,18 @@ impl Quadtree {
         [f64::from(min) - lobe, f64::from(max) + lobe]
     }
 
+    /// The ground of a quad, as far as the terrain goes: its south-west and north-east corners, m.
+    fn rectangle(&self, quad: QuadKey) -> ([f64; 2], [f64; 2]) {
+        let side = self.side(quad.level);
+        let low = [f64::from(quad.x) * side, f64::from(quad.y) * side];
+        (low, [(low[0] + side).min(self.extent[0]), (low[1] + side).min(self.extent[1])])
+    }
+
     /// No point of a quad as it is drawn is nearer to `eye`, m. Where it morphs it has its parent's shape, which may leave its own
     /// bounds, but not its parent's heights.
     pub fn nearest(&self, quad: QuadKey, eye: [f64; 3]) -> f64 {
-        let rectangle = |q: QuadKey| {
-            let side = self.side(q.level);
-            let low = [f64::from(q.x) * side, f64::from(q.y) * side];
-            (low, [(low[0] + side).min(self.extent[0]), (low[1] + side).min(self.extent[1])])
-        };
-        let (low, high) = rectangle(quad);
-        let (parent_low, parent_high) = rectangle(quad.ancestor(quad.level.saturating_sub(1)));
+        let (low, high) = self.rectangle(quad);
+        let (parent_low, parent_high) = self.rectangle(quad.ancestor(quad.level.saturating_sub(1)));
         let [min, max] = self.height_range(parent_low, parent_high);
         Bounds { low: [low[0], low[1], min], high: [high[0], high[1], max] }.distance(eye)
     }
@@ -163,17 +165,15 @@ impl Quadtree {
         let mut found = Vec::new();
         let mut open = vec![QuadKey { level: 0, x: 0, y: 0 }];
         while let Some(quad) = open.pop() {
-            let side = self.side(quad.level);
-            let low = [f64::from(quad.x) * side, f64::from(quad.y) * side];
+            let (low, high) = self.rectangle(quad);
             if low[0] >= self.extent[0] || low[1] >= self.extent[1] {
                 continue;
             }
-            let high = [(low[0] + side).min(self.extent[0]), (low[1] + side).min(self.extent[1])];
             let bounds = self.ground_bounds(low, high);
             if !keep(&bounds) {
                 continue;
             }
-            if quad.level + 1 < self.levels && bounds.distance(eye) < refine * side {
+            if quad.level + 1 < self.levels && bounds.distance(eye) < refine * self.side(quad.level) {
                 let (level, x, y) = (quad.level + 1, 2 * quad.x, 2 * quad.y);
                 open.extend([(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| QuadKey {
                     level,

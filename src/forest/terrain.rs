@@ -154,9 +154,9 @@ impl TerrainData {
             let shadows: Option<Vec<_>> =
                 cascades.iter().map(|c| select(&|b| b.touches(&c.planes, eye.position))).collect();
             if let (Some(camera), Some(shadows)) = (camera, shadows) {
-                let reach = cascades.last().map_or(0.0, |c| c.far);
-                let (mut near, far): (Vec<_>, Vec<_>) =
-                    camera.into_iter().partition(|q| self.tree.nearest(*q, eye.position) <= reach);
+                let (mut near, far): (Vec<_>, Vec<_>) = camera.into_iter().partition(|q| {
+                    cascades.last().is_some_and(|c| self.tree.nearest(*q, eye.position) <= c.far)
+                });
                 let shadowed = near.len() as u32;
                 near.extend(far);
                 if let Some(draws) = self.assign(&near, &shadows) {

@@ -18,8 +18,10 @@ use crate::plan::{Plan, ViewMode};
 pub struct Ground {
     /// Indices of a quad's mesh.
     pub indices: Buffer,
-    /// For quads that shadow cascades reach, and for those beyond: their shader looks into no shadow map.
-    programs: [Program; 2],
+    /// For quads that shadow cascades reach, if there are any.
+    shadowed: Option<Program>,
+    /// For those beyond: its shader looks into no shadow map.
+    beyond: Program,
     /// Stands for coverage tiles in scenes without trees.
     no_coverage: Image,
     no_nodes: Buffer,
@@ -60,7 +62,8 @@ impl Ground {
         };
         Ok(Ground {
             indices: gpu.buffer_with("terrain indices", &indices)?,
-            programs: [program(true)?, program(false)?],
+            shadowed: (plan.cascades > 0).then(|| program(true)).transpose()?,
+            beyond: program(false)?,
             no_coverage: gpu.image(&ImageDesc {
                 name: "no coverage",
                 format: coverage::FORMAT,
@@ -112,9 +115,8 @@ impl Ground {
                 ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
                 ("nodes", Resource::Buffer(nodes)),
             ];
-            for (program, quads) in
-                self.programs.iter().zip([0..draws.shadowed, draws.shadowed..draws.camera.1])
-            {
+            let near = self.shadowed.iter().map(|p| (p, 0..draws.shadowed));
+            for (program, quads) in near.chain([(&self.beyond, draws.shadowed..draws.camera.1)]) {
                 pass.bind(program, &resources);
                 pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
                 pass.draw_indexed(&self.indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, quads);

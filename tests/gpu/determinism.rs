@@ -47,24 +47,12 @@ fn fresh_renderers_draw_the_same_bits() {
     }
 }
 
-/// Bits of a picture, for another process to compare.
-fn digest(p: &Picture) -> String {
-    let mut h = blake3::Hasher::new();
-    h.update(&p.display);
-    if let Some(l) = &p.linear {
-        h.update(bytemuck::cast_slice(&l.sun)).update(bytemuck::cast_slice(&l.sky));
-        h.update(bytemuck::cast_slice(&l.depth)).update(bytemuck::cast_slice(&l.coverage));
-        h.update(bytemuck::cast_slice(&l.species)).update(bytemuck::cast_slice(&l.fractions));
-    }
-    h.finalize().to_hex().to_string()
-}
-
 /// What the test below runs in other processes, with the driver's number of threads in their environment.
 #[test]
 #[ignore = "run by any_number_of_driver_threads_draws_the_same_bits"]
 fn child() {
     let path = std::env::var_os("CANOPY_TEST_DIGEST").expect("set by the parent");
-    std::fs::write(path, digest(&picture(true))).unwrap();
+    std::fs::write(path, picture(true).digest()).unwrap();
 }
 
 #[test]

@@ -41,18 +41,6 @@ pub(super) fn draw(gpu: &Gpu, options: &Options, case: &SceneCase, layers: bool)
     Ok(first)
 }
 
-/// The bits of a picture.
-pub(super) fn digest(p: &Picture) -> String {
-    let mut h = blake3::Hasher::new();
-    h.update(&p.display);
-    if let Some(l) = &p.linear {
-        h.update(bytemuck::cast_slice(&l.sun)).update(bytemuck::cast_slice(&l.sky));
-        h.update(bytemuck::cast_slice(&l.depth)).update(bytemuck::cast_slice(&l.coverage));
-        h.update(bytemuck::cast_slice(&l.species)).update(bytemuck::cast_slice(&l.fractions));
-    }
-    h.finalize().to_hex().to_string()
-}
-
 /// Numbers that are numbers, fractions that sum to what is not background, and no more light than there is.
 pub(super) fn check(gpu: &Gpu, options: &Options, case: &SceneCase) -> Result<Finding> {
     let picture = draw(gpu, options, case, true)?;
@@ -106,23 +94,18 @@ pub(super) fn check(gpu: &Gpu, options: &Options, case: &SceneCase) -> Result<Fi
 /// The scene of determinism: every pass is in it.
 const DETERMINISM: &str = "hills";
 
-fn scene_of_determinism() -> Result<&'static SceneCase> {
-    let found = scenes::ALL.iter().find(|s| s.name == DETERMINISM);
-    found.ok_or_else(|| Error::Usage(format!("no scene \"{DETERMINISM}\" in the suite")))
-}
-
 /// Another renderer draws the same bits.
 pub(super) fn again(gpu: &Gpu, options: &Options) -> Result<Finding> {
-    let case = scene_of_determinism()?;
+    let case = scenes::find(DETERMINISM)?;
     let (a, b) = (draw(gpu, options, case, true)?, draw(gpu, options, case, true)?);
     let problem = (a != b).then(|| "two renderers draw other bits".to_string());
-    Ok(finding(problem.as_slice(), digest(&a)[..16].into()))
+    Ok(finding(problem.as_slice(), a.digest()[..16].into()))
 }
 
 /// After a flight elsewhere, with tiles thrown out and made again, the first view is the same bits as before: no tile in the
 /// caches is stale.
 pub(super) fn return_flight(gpu: &Gpu, options: &Options) -> Result<Finding> {
-    let (mut renderer, camera, exposure) = renderer(gpu, options, scene_of_determinism()?, true)?;
+    let (mut renderer, camera, exposure) = renderer(gpu, options, scenes::find(DETERMINISM)?, true)?;
     renderer.render(&camera, exposure)?;
     let before = renderer.picture()?;
     let mut made = 0;
@@ -147,7 +130,7 @@ pub(super) fn return_flight(gpu: &Gpu, options: &Options) -> Result<Finding> {
 
 /// A process with another number of driver threads draws the same bits as this one.
 pub(super) fn threads(gpu: &Gpu, options: &Options, threads: &str) -> Result<Finding> {
-    let here = digest(&draw(gpu, options, scene_of_determinism()?, true)?);
+    let here = draw(gpu, options, scenes::find(DETERMINISM)?, true)?.digest();
     let mut command = Command::new(&options.program);
     command.args(["conform", "--digest", DETERMINISM]).env("LP_NUM_THREADS", threads);
     if let Some(device) = &options.device {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::scenes::{SIZE, SceneCase};
 use super::{Finding, Suite, driver_key, finding, frames, with_device};
-use crate::image::Picture;
+use crate::image::png;
 use crate::{Error, Result};
 
 /// Largest mean FLIP against a reference of the same driver build. Its images are the same to the bit on one processor; the
@@ -36,7 +36,7 @@ pub(super) fn check(suite: &Suite, case: &SceneCase) -> Result<Finding> {
         Ok(finding(&[], String::new()))
     })?;
     let Some(picture) = drawn else { return Err(Error::Check("nothing was drawn".into())) };
-    let actual = rgb(&picture);
+    let actual = picture.rgb();
     let own = options.references.join(driver_key(&suite.driver));
     let file = format!("{}.png", case.name);
     if options.bless {
@@ -44,9 +44,8 @@ pub(super) fn check(suite: &Suite, case: &SceneCase) -> Result<Finding> {
         picture.write_png(&own.join(&file))?;
         return Ok(finding(&[], "blessed".into()));
     }
-    let png = |rgb: &[u8]| encode(rgb);
     let Some((whose, path, bound)) = reference(suite, &own, &file)? else {
-        let comparison = Comparison { reference: None, actual: png(&actual)?, map: None };
+        let comparison = Comparison { reference: None, actual: encode(&actual)?, map: None };
         let missing = format!("no reference {}; canopy conform --bless writes it", own.join(&file).display());
         return Ok(Finding { failure: Some(missing), measured: String::new(), comparison: Some(comparison) });
     };
@@ -63,8 +62,8 @@ pub(super) fn check(suite: &Suite, case: &SceneCase) -> Result<Finding> {
     Ok(Finding {
         comparison: Some(Comparison {
             reference: Some((whose.clone(), bytes)),
-            actual: png(&actual)?,
-            map: Some(png(&map)?),
+            actual: encode(&actual)?,
+            map: Some(encode(&map)?),
         }),
         ..finding(problem.as_slice(), format!("mean FLIP {mean:.5} against {whose}"))
     })
@@ -89,10 +88,6 @@ fn reference(suite: &Suite, own: &std::path::Path, file: &str) -> Result<Option<
     }))
 }
 
-fn rgb(picture: &Picture) -> Vec<u8> {
-    picture.display.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
-}
-
 /// Mean FLIP of two pictures, and its map in colours.
 fn flip(reference: &[u8], actual: &[u8]) -> (f64, Vec<u8>) {
     let [w, h] = SIZE;
@@ -104,11 +99,7 @@ fn flip(reference: &[u8], actual: &[u8]) -> (f64, Vec<u8>) {
 }
 
 fn encode(rgb: &[u8]) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
-    image::ImageEncoder::write_image(encoder, rgb, SIZE[0], SIZE[1], image::ExtendedColorType::Rgb8)
-        .map_err(|e| Error::Check(format!("cannot encode a picture: {e}")))?;
-    Ok(bytes)
+    png(rgb, SIZE).map_err(|e| Error::Check(format!("cannot encode a picture: {e}")))
 }
 
 #[cfg(test)]

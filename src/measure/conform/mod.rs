@@ -233,10 +233,9 @@ impl Suite {
 /// # Errors
 /// [`Error::Usage`] for a scene that is not in the suite, and what drawing it meets.
 pub fn digest(options: &Options, scene: &str) -> Result<String> {
-    let found = scenes::ALL.iter().find(|s| s.name == scene);
-    let scene = found.ok_or_else(|| Error::Usage(format!("no scene \"{scene}\" in the suite")))?;
+    let scene = scenes::find(scene)?;
     let gpu = Gpu::new(&GpuOptions { device: options.device.clone(), ..Default::default() })?;
-    let digest = frames::digest(&frames::draw(&gpu, options, scene, true)?);
+    let digest = frames::draw(&gpu, options, scene, true)?.digest();
     gpu.close()?;
     Ok(digest)
 }

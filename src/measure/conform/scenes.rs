@@ -92,6 +92,12 @@ pub const ALL: &[SceneCase] = &[
     SceneCase { name: "mode-normals", mode: ViewMode::Normals, ..HILLS },
 ];
 
+/// A scene by name.
+pub fn find(name: &str) -> Result<&'static SceneCase> {
+    let found = ALL.iter().find(|s| s.name == name);
+    found.ok_or_else(|| Error::Usage(format!("no scene \"{name}\" in the suite")))
+}
+
 impl SceneCase {
     /// The scene, with coarse views and small maps so that it is quick to bake and draw, and its camera.
     pub fn load(&self) -> Result<(Scene, Camera)> {
