@@ -53,7 +53,7 @@ struct Species {
     vec3 scale_to_metres;             // S: half extents of the tree box, m
     float centre;                     // height of the box's centre o above the trunk base, m
     vec3 reflectance;                 // of a leaf
-    float extinction;                 // of the crown, 1/m
+    float extinction;                 // tau of the crown's self-shadow, 1/(m rad)
     vec3 transmittance;               // of a leaf
     float range;                      // s_max: distance to which trees are drawn one by one, m
     float crown_radius;               // sqrt(A / pi), m
@@ -73,6 +73,7 @@ struct Species {
     float vertical_scale;             // of the space in which its tables are, BN12 eq. 2-6
     float max_thickness;              // density times area at the tables' last density
     float listed_density;             // listed trees per m2 where its map is 1; 0: not listed
+    float leaf_shadow;                // c of the crown's self-shadow, 1/sqrt(rad)
 };
 
 // Rows of the projection of scaled tree space into one z-field view.

@@ -73,8 +73,8 @@ knobs! {
     shadow_distance: f32, "m", 0.0..=1000000.0, [0.0, 0.0, 0.0], "range of the cascades; 0 is as far as light has not converged";
     coverage_size: u32, "texels", 32..=1024, [128, 256, 512], "texels a side of the coverage tile of a terrain quad; memory and the time to make one grow with the square";
     terrain_pixels: f32, "px", 1.0..=64.0, [12.0, 8.0, 4.0], "size of a terrain mesh cell on the screen; vertices grow with the inverse square";
-    hotspot_amplitude: f32, "", 0.0..=1.0, [0.2, 0.2, 0.2], "a1 of the leaf-scale hotspot (BN12, eq. 8)";
-    hotspot_width: f32, "1/rad", 0.0..=1000.0, [20.0, 20.0, 20.0], "a2 of the leaf-scale hotspot (BN12, eq. 8)";
+    hotspot_amplitude: f32, "", 0.0..=1.0, [0.0, 0.0, 0.0], "a1 of a hotspot (BN12, eq. 8: 0.2) on top of the one that is measured from each mesh";
+    hotspot_width: f32, "1/rad", 0.0..=1000.0, [20.0, 20.0, 20.0], "a2 of that hotspot (BN12, eq. 8)";
     ground_contrast: f32, "", 0.0..=4.0, [1.0, 1.0, 1.0], "a3: how much darker the ground is under trees than between them (BN12, eq. 10)";
     hole_radius: f32, "", 0.1..=10.0, [2.0, 2.0, 2.0], "radius of the hole around a tree times the square root of the density (BN12, eq. 9: 2; Poisson points: 0.5)";
     table_angles: u32, "", 4..=32, [16, 16, 16], "nodes of each angle in the tables of far trees; memory grows with the cube";

@@ -25,6 +25,7 @@ impl Sphere {
             crown_radius: radius,
             crown_base: center - radius,
             height: center + radius,
+            leaf_shadow: 0.0,
             extinction: 1.0,
         })
     }

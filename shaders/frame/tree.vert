@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
 #include "physics/hash.glsl"
+#include "physics/light.glsl"
 #include "physics/zfield.glsl"
 #include "frame/tree_space.glsl"
 
@@ -25,11 +26,11 @@ layout(location = 10) flat out vec4 light_c[3]; // w: layer
 layout(location = 13) flat out vec3 light_d[3]; // of one metre towards the sun
 layout(location = 16) flat out vec4 shadow_c;   // w: depth of one metre towards the sun
 layout(location = 17) flat out vec4 weights;    // of two views, of two light views
-layout(location = 18) flat out vec4 optics;     // mip, extinction, opacity factor, height of the eye in the tree
+layout(location = 18) flat out vec4 optics;     // mip, tau of the self-shadow times the phase angle, opacity factor, height of the eye in the tree
 layout(location = 19) flat out vec4 sun;        // w: 1 / r2 of the hole
 layout(location = 20) flat out vec4 sky;        // w: metres from the centre to the top
 layout(location = 21) flat out uvec4 tree_bits; // mask row; cascade | from below << 4 | species << 8
-layout(location = 22) flat out float dither;
+layout(location = 22) flat out vec2 own;       // dither, c of the self-shadow times the root of the phase angle
 layout(location = 23) flat out vec4 bark;       // relative colour; w: height under which there is only bark
 layout(location = 24) flat out vec4 mean_sun;   // average light, times nu; w: 1 - nu
 layout(location = 25) flat out vec4 mean_sky;   // w: average lit fraction, times nu
@@ -81,7 +82,9 @@ void main() {
     shadow_p.z += bias;
     shadow_c.z += bias;
     weights = vec4(t.view_weights, t.light_weights);
-    optics = vec4(t.mip, kind.extinction / t.scale, t.fade, c.z);
+    // The model's metres: what is in a crown grows with it.
+    float phase_angle = angle_between(-t.centre, v.sun_direction);
+    optics = vec4(t.mip, kind.extinction * phase_angle / t.scale, t.fade, c.z);
     sun = vec4(t.sun, t.hole);
     sky = vec4(t.sky, half_extent.z);
     uvec3 row = masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz;
@@ -89,5 +92,5 @@ void main() {
     bark = vec4(kind.bark, kind.crown_base);
     mean_sun = vec4(t.mean_sun, t.own);
     mean_sky = vec4(t.mean_sky, t.mean_lit);
-    dither = unit(hash(t.identity ^ HASH_DITHER));
+    own = vec2(unit(hash(t.identity ^ HASH_DITHER)), kind.leaf_shadow * sqrt(phase_angle));
 }

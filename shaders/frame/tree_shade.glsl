@@ -16,7 +16,7 @@ layout(location = 18) flat in vec4 optics;
 layout(location = 19) flat in vec4 sun;
 layout(location = 20) flat in vec4 sky;
 layout(location = 21) flat in uvec4 tree_bits;
-layout(location = 22) flat in float dither;
+layout(location = 22) flat in vec2 own; // dither, c of the self-shadow times the root of the phase angle
 layout(location = 23) flat in vec4 bark;
 layout(location = 24) flat in vec4 mean_sun;
 layout(location = 25) flat in vec4 mean_sky;
@@ -44,7 +44,7 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
     // Nothing behind the eye is seen: there s would be 1 or more.
     float s = clamp(at.s, -1e3, 0.999);
     float opacity = at.s < 0.999 ? at.opacity * optics.z : 0.0;
-    uint covered = covered_samples(opacity, dither, SAMPLES);
+    uint covered = covered_samples(opacity, own.x, SAMPLES);
     gl_SampleMask[0] = int(mask_column(tree_bits.xyz, covered, SAMPLES));
     // Reverse Z: depth is near / distance, and the distance shrinks by 1 - s.
     gl_FragDepth = min(gl_FragCoord.z / (1.0 - s), 1.0);
@@ -58,7 +58,7 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
     float height = mix(view_p[0].w, optics.w, s);
     vec3 colour = mean_sun.w * mix(bark.rgb, vec3(1.0), smoothstep(bark.w - 0.05, bark.w + 0.05, height));
     if (HAS_SUN) {
-        float through = 1.0, metres = 0.0;
+        float metres = 0.0;
         if (LIGHT_ITERATIONS > 0) {
             vec3 lp[3], ld[3];
             for (int i = 0; i < 3; i++) {
@@ -79,8 +79,9 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
                 }
             }
             metres = max(metres, 0.0);
-            through = exp(-optics.y * metres);
         }
+        // self_shadow() of physics/light.glsl, its angle in the factors.
+        float through = exp(-(own.y + sqrt(optics.y * metres)));
         vec3 entry = mix(shadow_p, shadow_c.xyz, s);
         entry.z += metres * shadow_c.w;
         uint cascade = tree_bits.w & 15u;

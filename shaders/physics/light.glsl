@@ -10,6 +10,12 @@ float hotspot(vec3 v, vec3 l, float a1, float a2) {
     return 1.0 - a1 * (1.0 - exp(-a2 * angle_between(v, l)));
 }
 
+// Share of a crown's visible surface that the crown itself leaves lit, at a phase angle, after the light's way through it:
+// exp(-sqrt(angle) (c + sqrt(tau metres))).
+float self_shadow(float angle, float metres, float c, float tau) {
+    return exp(-(c * sqrt(angle) + sqrt(max(tau * angle * metres, 0.0))));
+}
+
 // Radiance of fully lit, uniformly oriented bi-Lambertian leaves per irradiance: rho p of BN12 eq. 7 from reflectance r
 // and transmittance t. Ross (1981): Gamma = (r + t) (sin b - b cos b) / (3 pi) + t cos b / 3 with b the angle between
 // the light's propagation (-l) and v, and radiance 2 Gamma / pi because leaves extinguish half their area per volume.

@@ -8,8 +8,8 @@ use crate::Result;
 use crate::physics::views;
 use crate::scene::{Mesh, OpticsOverride};
 
-const FORMAT: Format = Format { magic: *b"CANOPYZF", version: 5, extension: "zfield" };
-const SCALARS: usize = 17;
+const FORMAT: Format = Format { magic: *b"CANOPYZF", version: 7, extension: "zfield" };
+const SCALARS: usize = 21;
 
 /// Where a bake came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +102,10 @@ fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
         b.center,
         b.radius,
         b.half_height,
+        b.turned[0],
+        b.turned[1],
+        b.turned[2],
+        b.leaf_shadow,
         b.extinction,
         r0,
         r1,
@@ -136,6 +140,10 @@ fn decode(mut parts: Vec<Vec<u8>>, settings: &BakeSettings) -> SpeciesBake {
         center,
         radius,
         half_height,
+        k0,
+        k1,
+        k2,
+        leaf_shadow,
         extinction,
         r0,
         r1,
@@ -156,6 +164,8 @@ fn decode(mut parts: Vec<Vec<u8>>, settings: &BakeSettings) -> SpeciesBake {
         center,
         radius,
         half_height,
+        turned: [k0, k1, k2],
+        leaf_shadow,
         extinction,
         reflectance: [r0, r1, r2],
         transmittance: [t0, t1, t2],

@@ -8,6 +8,7 @@ mod optics;
 mod raster;
 mod rays;
 mod scene;
+mod self_shadow;
 mod surface;
 pub mod tables;
 mod verify;
@@ -15,6 +16,7 @@ mod views;
 
 pub use cache::{CacheState, load_or_bake};
 pub use scene::{Baked, BakedFrom, forest_settings, load_or_bake_scene, pattern_density};
+pub use self_shadow::{LitCell, lit_cells};
 pub use tables::{ForestSettings, ForestTables, load_or_measure};
 pub use verify::{QualityReport, ViewQuality, demand, verify};
 
@@ -36,7 +38,12 @@ pub struct SpeciesBake {
     pub radius: f32,
     /// Half extent of the tree in z, m.
     pub half_height: f32,
-    /// Extinction coefficient of the crown, 1/m.
+    /// κ of leaves' reflectance and transmittance and of the bark's reflectance: what the crown, whose visible and lit leaves are
+    /// turned as they are and grow on twigs, scatters over what uniform leaves of these colours would.
+    pub turned: [f32; 3],
+    /// c of the crown's self-shadow ([`crate::physics::light::self_shadow`]), 1/√rad.
+    pub leaf_shadow: f32,
+    /// τ of the crown's self-shadow, 1/(m rad).
     pub extinction: f32,
     /// Leaf reflectance, linear RGB.
     pub reflectance: [f32; 3],
@@ -55,6 +62,13 @@ pub struct SpeciesBake {
 }
 
 impl SpeciesBake {
+    /// Reflectance and transmittance of the uniform leaves that scatter as the crown does, linear RGB: κ_r r + κ_b b and κ_t t.
+    pub fn crown(&self) -> [[f32; 3]; 2] {
+        let [r, t, b] = self.turned;
+        let reflectance = std::array::from_fn(|i| r * self.reflectance[i] + b * self.bark[i]);
+        [reflectance, self.transmittance.map(|x| t * x)]
+    }
+
     /// Leaf single-scattering albedo, linear RGB: reflectance + transmittance.
     pub fn albedo(&self) -> [f32; 3] {
         std::array::from_fn(|i| self.reflectance[i] + self.transmittance[i])

@@ -1,12 +1,6 @@
 //! What light meets in a crown, measured from the mesh.
 //!
-//! - Leaf area L: one-sided area of all foliage that the masks leave, m². Every card counts once: the back of
-//!   a card modelled as a second triangle with the same corners does not count again.
-//! - Crown volume V: what the z-field's light rays travel through, m³. A view's ∫ (nearest − farthest depth) dA
-//!   is the volume between its two surfaces; V is its mean over the hemisphere of views.
-//! - Extinction (BBP08 eq. 5): leaves of uniform orientation show half their area to every direction, so
-//!   τ = L/(2V). With this V, the mean over directions of τ·∫(z − z̄)dA is L/2, the leaf area really in the
-//!   way: the medium has the mesh's mean optical depth.
+//! - Self-shadow, c and τ of [`crate::physics::light::self_shadow`], and how leaves are turned, κ: see [`super::self_shadow`].
 //! - Albedo: leaf reflectance r is the mean linear colour of the foliage's opaque texels times the material's
 //!   factor; transmittance t is r/2 unless the scene states it; ρ = r + t. Measured broad leaves have t a
 //!   little below r in the visible range and needles well below, and base colour textures carry no
@@ -18,9 +12,9 @@ use std::collections::HashSet;
 use glam::{Vec2, Vec3};
 
 use super::surface::Surface;
-use super::{SpeciesBake, ZField};
+use super::{SpeciesBake, ZField, self_shadow};
 use crate::physics::tonemap::linear as linear_from_srgb;
-use crate::physics::views::{self, Basis};
+use crate::physics::views;
 use crate::scene::{Material, Mesh, OpticsOverride, Texture};
 
 /// Subdivisions a side of a triangle for measuring masks and colours: 256 equal parts, sampled in the middle.
@@ -119,28 +113,6 @@ fn nearest(texture: &Texture, uv: Vec2) -> [u8; 3] {
     [texture.rgba[at], texture.rgba[at + 1], texture.rgba[at + 2]]
 }
 
-/// Mean over the hemisphere of the volume between nearest and farthest surfaces, in units of det S.
-///
-/// ∫ (z − z̄) dA over a view is a plain sum over texels, since depths are premultiplied by the opacity. Views
-/// are weighted by their share of the hemisphere: the band of a ring k over its 4k views.
-pub fn volume(field: &ZField) -> f64 {
-    let m = f64::from(field.resolution) / f64::from(field.resolution - 2);
-    let step = std::f64::consts::FRAC_PI_2 / f64::from(field.n);
-    let layer_size = (field.resolution * field.resolution * 4) as usize;
-    let mut total = 0.0;
-    for (layer, (i, j)) in field.levels[0].chunks_exact(layer_size).zip(views::pairs(field.n)) {
-        let ring = (i.abs() + j.abs()) as f64;
-        let band = ((ring - 0.5).max(0.0) * step).cos()
-            - ((ring + 0.5) * step).min(std::f64::consts::FRAC_PI_2).cos();
-        let weight = band / (4.0 * ring).max(1.0);
-        let basis = Basis::new(views::direction(field.n, i, j));
-        let texel = 4.0 * m * m * basis.extent / f64::from(field.resolution).powi(2);
-        let sum: u64 = layer.chunks_exact(4).map(|t| u64::from(t[0].saturating_sub(t[1]))).sum();
-        total += weight * texel * (sum as f64 / 255.0) * 2.0 * std::f64::consts::SQRT_2;
-    }
-    total
-}
-
 /// Horizontal projected area in units of `radius`²: the opacity of the view from the zenith.
 pub fn top_area(field: &ZField) -> f64 {
     let m = f64::from(field.resolution) / f64::from(field.resolution - 2);
@@ -155,8 +127,11 @@ pub fn top_area(field: &ZField) -> f64 {
 pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOverride) -> SpeciesBake {
     let leaves = leaves(mesh, surface);
     let frame = surface.frame;
-    let volume = volume(&views) * frame.scale().as_dvec3().element_product();
-    let measured = if volume > 0.0 { (0.5 * leaves.area / volume) as f32 } else { 0.0 };
+    // A tree without foliage: all of it stands for leaves.
+    let foliage: Vec<bool> = mesh.materials.iter().map(|m| m.foliage || !leaves.foliage).collect();
+    let matter = self_shadow::Matter { foliage: &foliage, base: leaves.base };
+    let self_shadow::Measured { shadow, turned } = self_shadow::measure(surface, &matter, &views);
+    let [leaf_shadow, extinction] = shadow.map(|x| x as f32);
     let color = leaves.color.map(|c| c as f32);
     let (reflectance, share) = if leaves.foliage {
         (stated.leaf_reflectance.unwrap_or(color), 0.5)
@@ -173,7 +148,9 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
         center: frame.center,
         radius: frame.radius,
         half_height: frame.half_height,
-        extinction: stated.extinction.unwrap_or(measured),
+        turned: turned.map(|x| x as f32),
+        leaf_shadow,
+        extinction: stated.extinction.unwrap_or(extinction),
         reflectance,
         bark: stated.bark_reflectance.unwrap_or(leaves.bark.map(|c| c as f32)),
         // A leaf scatters no more than it gets.

@@ -89,24 +89,55 @@ impl<'a> Rays<'a> {
         false
     }
 
-    /// Möller and Trumbore's intersection, then the mask.
+    /// The first surface on the ray, if there is any: its parameter, and the index of its face.
+    pub fn first(&self, origin: Vec3, direction: Vec3) -> Option<(f32, u32)> {
+        let inverse = direction.recip();
+        let (mut index, mut first) = (0, (f32::INFINITY, 0));
+        while let Some(node) = self.nodes.get(index) {
+            if node.face != u32::MAX {
+                if let Some(t) = self.hit(node.face, origin, direction).filter(|t| *t > 0.0 && *t < first.0) {
+                    first = (t, node.face);
+                }
+                index += 1;
+                continue;
+            }
+            let (t0, t1) = ((node.low - origin) * inverse, (node.high - origin) * inverse);
+            let (near, far) = (t0.min(t1).max_element(), t0.max(t1).min_element());
+            let enters = near <= far * (1.0 + 4.0 * f32::EPSILON) && far >= 0.0 && near <= first.0;
+            index = if enters { index + 1 } else { node.exit as usize };
+        }
+        first.0.is_finite().then_some(first)
+    }
+
+    /// Unit normal of a face, to either side.
+    pub fn normal(&self, face: u32) -> Vec3 {
+        let [a, b, c] = self.corners[face as usize];
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+
     fn hits(&self, face: u32, origin: Vec3, direction: Vec3, t_min: f32) -> bool {
+        self.hit(face, origin, direction).is_some_and(|t| t > t_min)
+    }
+
+    /// Möller and Trumbore's intersection, then the mask: the parameter on the ray.
+    fn hit(&self, face: u32, origin: Vec3, direction: Vec3) -> Option<f32> {
         let [a, b, c] = self.corners[face as usize];
         let (e1, e2) = (b - a, c - a);
         let p = direction.cross(e2);
         let det = e1.dot(p);
         if det == 0.0 {
-            return false;
+            return None;
         }
         let inverse = 1.0 / det;
         let s = origin - a;
         let u = s.dot(p) * inverse;
         let q = s.cross(e1);
         let v = direction.dot(q) * inverse;
-        if u < 0.0 || v < 0.0 || u + v > 1.0 || e2.dot(q) * inverse <= t_min {
-            return false;
+        if u < 0.0 || v < 0.0 || u + v > 1.0 {
+            return None;
         }
         let f = &self.surface.faces[face as usize];
-        self.surface.opaque(f, f.uv[0] * (1.0 - u - v) + f.uv[1] * u + f.uv[2] * v)
+        let there = self.surface.opaque(f, f.uv[0] * (1.0 - u - v) + f.uv[1] * u + f.uv[2] * v);
+        there.then_some(e2.dot(q) * inverse)
     }
 }

@@ -203,12 +203,14 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Baked], maps: &[Option<Map>], view_
             maps[k].as_ref().map_or([1.0; 2], |m| [m.relative.width as f32, m.relative.height as f32]);
         let [low, high] = between.unwrap_or([-1e30, 1e30]);
         let tangent = slope.map_or(1e30, |s| s.to_radians().tan());
+        let [reflectance, transmittance] = bake.crown();
         rows.push(Row {
             scale_to_metres: [bake.radius, bake.radius, bake.half_height],
             centre: bake.center,
-            reflectance: bake.reflectance,
+            reflectance,
             extinction: bake.extinction,
-            transmittance: bake.transmittance,
+            leaf_shadow: bake.leaf_shadow,
+            transmittance,
             range: plan.species_range[k] as f32,
             crown_radius: bake.crown_radius,
             bounding_radius: bake.radius.hypot(bake.half_height),
@@ -223,7 +225,7 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Baked], maps: &[Option<Map>], view_
             slope_softness: if slope.is_some() { SLOPE_SOFTNESS * tangent } else { 1.0 },
             crown_base: (bake.crown_base - bake.center) / bake.half_height,
             // Black leaves have no colour to compare with.
-            bark: std::array::from_fn(|i| bake.bark[i] / bake.albedo()[i].max(1e-3)),
+            bark: std::array::from_fn(|i| bake.bark[i] / (reflectance[i] + transmittance[i]).max(1e-3)),
             mean_area: std::f32::consts::PI * bake.crown_radius.powi(2) * mean_squared_scale(species) as f32,
             vertical_scale: tables.vertical_scale,
             max_thickness: tables.max_thickness,

@@ -118,7 +118,7 @@ pub struct OpticsOverride {
     pub leaf_transmittance: Option<[f32; 3]>,
     /// Bark reflectance, RGB.
     pub bark_reflectance: Option<[f32; 3]>,
-    /// Extinction coefficient of the crown, 1/m.
+    /// τ of the crown's self-shadow ([`crate::physics::light::self_shadow`]), 1/(m rad).
     pub extinction: Option<f32>,
 }
 

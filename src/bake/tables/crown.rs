@@ -21,7 +21,9 @@ pub struct Shape {
     pub crown_base: f32,
     /// Height of the tree, m.
     pub height: f32,
-    /// Extinction coefficient of the crown, 1/m.
+    /// c and τ of the crown's self-shadow ([`crate::physics::light::self_shadow`]), 1/√rad and 1/(m rad).
+    pub leaf_shadow: f32,
+    /// See there.
     pub extinction: f32,
 }
 
@@ -35,6 +37,7 @@ impl Shape {
             crown_radius: bake.crown_radius,
             crown_base: bake.crown_base,
             height: bake.height,
+            leaf_shadow: bake.leaf_shadow,
             extinction: bake.extinction,
         }
     }

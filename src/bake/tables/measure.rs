@@ -157,7 +157,8 @@ struct SeenCrown<const M: usize> {
 }
 
 /// Points of a view direction, by patch, and sums over them.
-struct ViewPoints<const M: usize> {
+struct ViewPoints<A, const M: usize> {
+    heading: Heading<A>,
     ground: Vec<Vec<GroundPoint<M>>>,
     crown: Vec<Vec<CrownPoint<M>>>,
     /// Σ visible and Σ weight, by patch.
@@ -292,7 +293,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
     }
 
     /// View rays of a direction: the points that light is then cast to, and what needs no light.
-    fn view_points(&self, theta_v: f64) -> (ViewPoints<M>, Vec<ViewEstimate>) {
+    fn view_points(&self, theta_v: f64) -> (ViewPoints<C::Aim, M>, Vec<ViewEstimate>) {
         let heading = Heading::new(self.crown, theta_v, self.vertical_scale);
         let by_patch: Vec<_> = (0..PATCHES)
             .into_par_iter()
@@ -319,6 +320,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
             .collect();
         let expected = by_patch.iter().map(|p| p.0.map(|v| f64::from(v) * share)).collect();
         let mut points = ViewPoints {
+            heading,
             ground: Vec::new(),
             crown: Vec::new(),
             visible: Vec::new(),
@@ -454,9 +456,11 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
     }
 
     /// All densities and azimuths of a pair of zenith angles, by (x, φ).
-    fn pairs(&self, points: &ViewPoints<M>, theta_l: f64) -> Vec<PairEstimate> {
+    fn pairs(&self, points: &ViewPoints<C::Aim, M>, theta_l: f64) -> Vec<PairEstimate> {
         let (n, m) = (self.forest.angles as usize, self.densities());
         let heading = Heading::new(self.crown, theta_l, self.vertical_scale);
+        let angles: Vec<f32> =
+            (0..n).map(|k| points.heading.angle_to(&heading, azimuth_node(n, k)) as f32).collect();
         let mut marks = Marks::new(self.patches.iter().map(|p| p.trees.len()).max().unwrap_or(0));
         // By patch: the mean share of lit ground; by azimuth and patch, sums of y, t_l, and lit leaves and bark.
         let lit: Vec<[f64; M]> = (0..PATCHES).map(|p| self.lit(p, &heading, &mut marks)).collect();
@@ -499,7 +503,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                 for (k, trees) in trees.iter_mut().enumerate() {
                     let trees = &mut trees[p];
                     let azimuth = Azimuth::new(c.azimuth + c.side * azimuth_node(n, k));
-                    let (own, entry) = own(self.crown, patch, &heading, &azimuth, &c.receiver);
+                    let (own, entry) = own(self.crown, patch, &heading, &azimuth, (&c.receiver, angles[k]));
                     trees.isolated.add(&c.weight, own, c.bark);
                     if c.front.is_none() {
                         continue;

@@ -204,6 +204,7 @@ mod tests {
         crown_radius: 3.0,
         crown_base: 2.0,
         height: 10.0,
+        leaf_shadow: 0.0,
         extinction: 1.0,
     };
 

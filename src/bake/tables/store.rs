@@ -9,7 +9,7 @@ use crate::Result;
 use crate::bake::file::{Fields, Format, load_or_build};
 use crate::bake::{CacheState, SpeciesBake};
 
-const FORMAT: Format = Format { magic: *b"CANOPYFT", version: 1, extension: "forest" };
+const FORMAT: Format = Format { magic: *b"CANOPYFT", version: 2, extension: "forest" };
 
 /// The tables of a species in a forest, from the cache in `cache_dir` if they are there, else measured and put there. With
 /// `None` nothing is read or written.
@@ -67,8 +67,10 @@ pub fn key(bake: &SpeciesBake, forest: &ForestSettings) -> [u8; 32] {
     }
     fields.put(&pattern_density.to_le_bytes());
     fields.put(&little(&[scale_range[0], scale_range[1], hole_radius]));
-    let Shape { center, radius, half_height, crown_radius, crown_base, height, extinction } = Shape::of(bake);
-    fields.put(&little(&[center, radius, half_height, crown_radius, crown_base, height, extinction]));
+    let Shape { center, radius, half_height, crown_radius, crown_base, height, leaf_shadow, extinction } =
+        Shape::of(bake);
+    let shape = [center, radius, half_height, crown_radius, crown_base, height, leaf_shadow, extinction];
+    fields.put(&little(&shape));
     fields.put(&bake.views.n.to_le_bytes());
     fields.put(&bake.views.resolution.to_le_bytes());
     // Only these levels are looked at.

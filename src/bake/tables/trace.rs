@@ -55,6 +55,14 @@ impl<A> Heading<A> {
         }
     }
 
+    /// Angle to another heading that an azimuth parts from it, rad; 0 exactly for the same.
+    pub fn angle_to(&self, other: &Self, azimuth: f64) -> f64 {
+        let [(s0, c0), (s1, c1)] = [self, other].map(|h| (f64::from(h.sine), f64::from(h.cosine)));
+        let (across, along) = azimuth.sin_cos();
+        let chord = (s0 - s1 * along).hypot(s1 * across).hypot(c0 - c1);
+        2.0 * (0.5 * chord).min(1.0).asin()
+    }
+
     /// Half extents of a crown's box across the ray: |a| ≤ 1, |b| ≤ sin + cos.
     pub fn extent(&self) -> f32 {
         self.scaled[0] + self.scaled[1]
@@ -267,14 +275,15 @@ pub struct Light<const M: usize> {
     pub overlap: f32,
 }
 
-/// What a receiver's own tree leaves of the light, exp(−τ s/scale) over the metres s to where the ray enters it, and s.
+/// What a receiver's own tree leaves of the light at a phase angle, rad, over the metres s to where the ray enters it, and s
+/// ([`crate::physics::light::self_shadow`]; metres of the model, because what is in a crown grows with it).
 #[inline]
 pub fn own<C: Crown>(
     crown: &C,
     patch: &Patch,
     heading: &Heading<C::Aim>,
     azimuth: &Azimuth,
-    receiver: &Receiver,
+    (receiver, angle): (&Receiver, f32),
 ) -> (f32, f32) {
     let Some(tree) = &receiver.tree else { return (1.0, 0.0) };
     // Across the torus the point may lie near another image of its tree.
@@ -282,10 +291,14 @@ pub fn own<C: Crown>(
         let d = receiver.position[k] - tree.position[k];
         d - (d / patch.side).round() * patch.side
     });
-    let Some(met) = at_tree(crown, heading, azimuth, tree, offset, receiver.z) else { return (1.0, 0.0) };
-    let Some(depth) = crown.entry(&heading.aims[met.step as usize], met.a, met.b) else { return (1.0, 0.0) };
-    let metres = ((depth - met.depth) * met.metres).max(0.0);
-    ((-crown.shape().extinction / tree.scale * metres).exp(), metres)
+    let metres = at_tree(crown, heading, azimuth, tree, offset, receiver.z).and_then(|met| {
+        let depth = crown.entry(&heading.aims[met.step as usize], met.a, met.b)?;
+        Some(((depth - met.depth) * met.metres).max(0.0))
+    });
+    let metres = metres.unwrap_or(0.0);
+    let shape = crown.shape();
+    let through = shape.leaf_shadow * angle.sqrt() + (shape.extinction / tree.scale * angle * metres).sqrt();
+    ((-through).exp(), metres)
 }
 
 /// The ray of light to a receiver, past its own tree, which it enters after `entry` m: others shadow it if their back lies
