@@ -73,6 +73,7 @@ pub mod measure;
 pub mod physics;
 pub mod plan;
 pub mod progress;
+pub mod reference;
 pub mod scene;
 pub mod settings;
 pub mod tree;

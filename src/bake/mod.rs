@@ -4,11 +4,11 @@ pub mod cache;
 #[doc(hidden)]
 pub mod file;
 mod occlusion;
-mod optics;
+pub(crate) mod optics;
 mod raster;
 mod rays;
 mod scene;
-mod surface;
+pub(crate) mod surface;
 pub mod tables;
 mod verify;
 mod views;

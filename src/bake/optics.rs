@@ -151,12 +151,23 @@ pub fn top_area(field: &ZField) -> f64 {
     sum as f64 / 255.0 * (2.0 * m / f64::from(field.resolution)).powi(2)
 }
 
-/// Puts views and measurements together; what the scene states wins over what the mesh shows.
-pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOverride) -> SpeciesBake {
-    let leaves = leaves(mesh, surface);
-    let frame = surface.frame;
-    let volume = volume(&views) * frame.scale().as_dvec3().element_product();
-    let measured = if volume > 0.0 { (0.5 * leaves.area / volume) as f32 } else { 0.0 };
+/// Reflectances of a species, linear RGB.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Colours {
+    /// Leaf reflectance; that of the whole surface where there is no foliage.
+    pub reflectance: [f32; 3],
+    /// Leaf transmittance; with the reflectance at most 1.
+    pub transmittance: [f32; 3],
+    /// Bark reflectance.
+    pub bark: [f32; 3],
+}
+
+/// Reflectances measured from a mesh; what the scene states wins.
+pub fn colours(mesh: &Mesh, surface: &Surface, stated: &OpticsOverride) -> Colours {
+    colours_of(&leaves(mesh, surface), stated)
+}
+
+fn colours_of(leaves: &Leaves, stated: &OpticsOverride) -> Colours {
     let color = leaves.color.map(|c| c as f32);
     let (reflectance, share) = if leaves.foliage {
         (stated.leaf_reflectance.unwrap_or(color), 0.5)
@@ -167,6 +178,21 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
         Some(t) if leaves.foliage => t,
         _ => reflectance.map(|r| share * r),
     };
+    Colours {
+        reflectance,
+        // A leaf scatters no more than it gets.
+        transmittance: std::array::from_fn(|i| transmittance[i].min(1.0 - reflectance[i])),
+        bark: stated.bark_reflectance.unwrap_or(leaves.bark.map(|c| c as f32)),
+    }
+}
+
+/// Puts views and measurements together; what the scene states wins over what the mesh shows.
+pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOverride) -> SpeciesBake {
+    let leaves = leaves(mesh, surface);
+    let frame = surface.frame;
+    let volume = volume(&views) * frame.scale().as_dvec3().element_product();
+    let measured = if volume > 0.0 { (0.5 * leaves.area / volume) as f32 } else { 0.0 };
+    let colours = colours_of(&leaves, stated);
     let area = top_area(&views) * f64::from(frame.radius).powi(2);
     SpeciesBake {
         views,
@@ -174,10 +200,9 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
         radius: frame.radius,
         half_height: frame.half_height,
         extinction: stated.extinction.unwrap_or(measured),
-        reflectance,
-        bark: stated.bark_reflectance.unwrap_or(leaves.bark.map(|c| c as f32)),
-        // A leaf scatters no more than it gets.
-        transmittance: std::array::from_fn(|i| transmittance[i].min(1.0 - reflectance[i])),
+        reflectance: colours.reflectance,
+        bark: colours.bark,
+        transmittance: colours.transmittance,
         area: area as f32,
         crown_radius: (area / std::f64::consts::PI).sqrt() as f32,
         crown_base: leaves.base,
