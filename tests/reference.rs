@@ -266,8 +266,9 @@ fn poisson_spheres_have_the_closed_forms() {
         assert!((lit_ground - lit).abs() < spread(lit, both), "{lit_ground} {lit}");
         assert!((lit_ground + shadowed_ground + lit_tree + shadowed_tree - 1.0).abs() < 1e-12);
         if (zenith, azimuth) == (40.0, 180.0) {
-            // Seen from the sun there is no shadow; but for the facets of the limb that turn away.
-            assert!(shadowed_ground < 1e-4 && shadowed_tree < 1e-4, "{shadowed_ground} {shadowed_tree}");
+            // Seen from the sun there is no shadow; but for rays of the image that are 1/600 off, by limbs of 1/24 of a turn a
+            // facet.
+            assert!(shadowed_ground < 1e-3 && shadowed_tree < 1e-3, "{shadowed_ground} {shadowed_tree}");
         }
     }
 }
@@ -285,7 +286,7 @@ fn sun_and_viewer_may_be_swapped() {
         scene.sun.elevation = 90.0 - light[0];
         scene.sun.azimuth = light[1];
         let eye = from_afar([100.0, 101.0, 2.5], view[0], view[1], 16.0, 64);
-        render(scene, &eye, &Options { seed: 4, until: Until::Samples(64), ..Options::default() }).mean()
+        render(scene, &eye, &Options { seed: 4, until: Until::Samples(200), ..Options::default() }).mean()
     };
     for (a, b) in [([20.0, 30.0], [70.0, 100.0]), ([50.0, 0.0], [60.0, 180.0])] {
         let (there, back) = (power(&mut scene, a, b), power(&mut scene, b, a));
@@ -294,7 +295,7 @@ fn sun_and_viewer_may_be_swapped() {
             println!("{a:?} {b:?}: {} {} within {room}", there.sun[k], back.sun[k]);
             // Seen from so far, rays of an image are parallel to 16/4800: 0.2 % at most.
             assert!((there.sun[k] - back.sun[k]).abs() < room + 0.002 * there.sun[k]);
-            assert!(room < 0.05 * there.sun[k], "the bound says something");
+            assert!(room < 0.06 * there.sun[k], "the bound says something");
         }
     }
 }
@@ -446,4 +447,102 @@ fn too_many_trees_and_wrong_options_are_refused() {
     let wide = Eye::looking([0.0, 0.0, 50.0], [1.0, 1.0, -0.2], 60.0, [8, 8]);
     let error = World::new(&scene, &[wide]).err().expect("25 million trees").to_string();
     assert!(error.contains("4000000 trees"), "{error}");
+}
+
+/// The program in an empty folder, where no Vulkan driver is found.
+fn program(dir: &Path, words: &str) -> std::process::Output {
+    let mut c = std::process::Command::new(env!("CARGO_BIN_EXE_canopy"));
+    c.env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent");
+    c.current_dir(dir).args(words.split_whitespace()).output().unwrap()
+}
+
+const SCENE: &str = "name = \"small\"\n[terrain]\nextent = 120.0\n[[species]]\nname = \"birch\"\nmodel = \"builtin:birch\"\n\
+    density = 0.01\n[sun]\nazimuth = 180.0\nelevation = 40.0\nirradiance = 1.0\n[sky]\nradiance = 0.1\n[[camera]]\nname = \"a\"\n\
+    position = [60.0, 20.0, 9.0]\ntarget = [60.0, 60.0, 5.0]\nvertical_fov = 45.0\n";
+
+#[test]
+fn the_program_draws_and_resumes_a_reference_without_a_device() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("s.toml"), SCENE).unwrap();
+    let render = "render s.toml --representation reference --size 24x16 --json --quiet";
+    let run = |words: &str| {
+        let out = program(dir.path(), &format!("{render} {words}"));
+        assert!(out.status.success(), "{words}: {}", String::from_utf8_lossy(&out.stderr));
+        serde_json::from_slice::<serde_json::Value>(&out.stdout).unwrap()
+    };
+    let whole = run("--until 6spp -o whole.png --exr whole.exr");
+    let half = run("--until 3spp -o half.png --resume half.sums");
+    let rest = run("--until 6spp -o rest.png --exr rest.exr --resume half.sums");
+    assert_eq!((half["samples"].as_u64(), half["resumed_samples"].as_u64()), (Some(3), Some(0)));
+    assert_eq!((rest["samples"].as_u64(), rest["resumed_samples"].as_u64()), (Some(6), Some(3)));
+    assert_eq!(whole["relative_error"], rest["relative_error"]);
+    let read = |name: &str| std::fs::read(dir.path().join(name)).unwrap();
+    assert!(read("whole.png") == read("rest.png") && read("whole.exr") == read("rest.exr"));
+    // The layers of the renderer's image, and two more.
+    let image = exr::prelude::read_all_data_from_file(dir.path().join("rest.exr")).unwrap();
+    let names: Vec<String> = image
+        .layer_data
+        .iter()
+        .filter_map(|l| l.attributes.layer_name.as_ref())
+        .map(|n| n.to_string())
+        .collect();
+    let wanted = "radiance sun sky depth trees species fractions variance samples";
+    assert_eq!(names, wanted.split(' ').collect::<Vec<_>>());
+    assert!(run("--until 50% -o e.png")["relative_error"].as_f64().unwrap() <= 0.5);
+    assert_eq!(run("--until 2spp --light sky --bounces 1 -o k.png")["bounces"].as_u64(), Some(1));
+
+    for (words, wanted) in [
+        (
+            format!("{render} -o x.png --until 6spp --bounces 2 --resume half.sums"),
+            "What differs: number of bounces",
+        ),
+        (format!("{render} -o x.png --until 1spp"), "which a variance needs"),
+        (format!("{render} -o x.png --until 5"), "such as 1%"),
+        (format!("{render} -o x.png --bounces 0"), "from 1 on"),
+        (format!("{render} -o x.png --frames 2"), "--frames"),
+        (format!("{render} -o x.png --resume s.toml"), "no estimate of a reference"),
+        ("render s.toml -o x.png --until 3spp".into(), "--until is for --representation reference"),
+        ("render s.toml -o x.png --resume half.sums".into(), "--resume is for"),
+        ("reflectance s.toml --bounces 1".into(), "--bounces is for"),
+    ] {
+        let out = program(dir.path(), &words);
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{words}: {said}");
+        assert!(said.contains(wanted), "{words}: {said}");
+        assert!(!dir.path().join("x.png").exists());
+    }
+}
+
+#[test]
+fn the_program_measures_reflectance_by_the_reference_without_a_device() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("s.toml"), SCENE).unwrap();
+    let reflectance = "reflectance s.toml --representation reference --patches 2 --patch-side 60 --patch-pixels 24 \
+        --view-zenith -30,30 --distance 100,900 --until 5% --quiet";
+    let out = program(dir.path(), reflectance);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let text = String::from_utf8(out.stdout).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+    assert_eq!((rows.len(), rows[0].len(), rows[1][0]), (5, 22, "reference"));
+    // Distance means nothing to it.
+    assert_eq!((rows[1][1], rows[3][1]), ("100", "900"));
+    assert_eq!(rows[1][2..], rows[3][2..]);
+    let value = |row: usize, column: &str| -> f64 {
+        rows[row][rows[0].iter().position(|c| *c == column).unwrap()].parse().unwrap()
+    };
+    let k = ["k_lit_ground", "k_shadowed_ground", "k_lit_tree", "k_shadowed_tree"];
+    assert!((k.iter().map(|k| value(1, k)).sum::<f64>() - 1.0).abs() < 1e-6);
+    // The sun is behind the viewer of the second row: less shadow, more light.
+    assert!(value(2, "k_shadowed_ground") < value(1, "k_shadowed_ground"));
+    assert!(value(2, "sun_g") > value(1, "sun_g") && value(1, "sky_g") > 0.0);
+    let out = program(dir.path(), &format!("{reflectance} --json --bounces 1"));
+    let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    for row in report["rows"].as_array().unwrap() {
+        let radiance = |c: usize| row["sun"][c].as_f64().unwrap() + row["sky"][c].as_f64().unwrap();
+        let noise = (0..3).map(|c| row["noise"][c].as_f64().unwrap() / radiance(c)).fold(0.0, f64::max);
+        // Each of two images to 5 %.
+        assert!(noise > 0.0 && noise < 0.05 / 2f64.sqrt() * 1.1, "{noise}");
+        // Single scattering is less light than all of it.
+        assert!(row["sun"][1].as_f64().unwrap() < value(2, "sun_g"));
+    }
 }

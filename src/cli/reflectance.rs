@@ -81,7 +81,7 @@ pub struct Args {
     /// Inclinations of the ground, degrees
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = list)]
     slope: List,
-    /// How trees are drawn: auto, zfield, shader-map; or several with commas between
+    /// How trees are drawn: auto, zfield, shader-map, or reference (path tracing on the CPU); several with commas between
     #[arg(long, value_name = "NAMES", default_value = "auto", value_delimiter = ',', value_parser = named(Drawn::names()))]
     representation: Vec<Drawn>,
     #[command(flatten)]

@@ -192,23 +192,16 @@ impl Pack {
     #[inline]
     #[allow(clippy::type_complexity)]
     fn hits(&self, o: Vec3, d: Vec3, t_max: f32) -> Option<(u32, [f32; 4], [f32; 4], [f32; 4])> {
-        let cross = |a: &[Vec4; 3], b: &[Vec4; 3]| {
-            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-        };
-        let dot = |a: &[Vec4; 3], b: &[Vec4; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let d = [d.x, d.y, d.z].map(Vec4::splat);
-        let [e1, e2] = &self.edges;
-        let p = cross(&d, e2);
-        let inverse = dot(e1, &p).recip();
-        let s = [
-            Vec4::splat(o.x) - self.corner[0],
-            Vec4::splat(o.y) - self.corner[1],
-            Vec4::splat(o.z) - self.corner[2],
-        ];
-        let u = dot(&s, &p) * inverse;
-        let q = cross(&s, e1);
-        let v = dot(&d, &q) * inverse;
-        let t = dot(e2, &q) * inverse;
+        let (dx, dy, dz) = (Vec4::splat(d.x), Vec4::splat(d.y), Vec4::splat(d.z));
+        let [[ax, ay, az], [bx, by, bz]] = self.edges;
+        let (px, py, pz) = (dy * bz - dz * by, dz * bx - dx * bz, dx * by - dy * bx);
+        let inverse = (ax * px + ay * py + az * pz).recip();
+        let [cx, cy, cz] = self.corner;
+        let (sx, sy, sz) = (Vec4::splat(o.x) - cx, Vec4::splat(o.y) - cy, Vec4::splat(o.z) - cz);
+        let u = (sx * px + sy * py + sz * pz) * inverse;
+        let (qx, qy, qz) = (sy * az - sz * ay, sz * ax - sx * az, sx * ay - sy * ax);
+        let v = (dx * qx + dy * qy + dz * qz) * inverse;
+        let t = (bx * qx + by * qy + bz * qz) * inverse;
         let inside = u.cmpge(Vec4::ZERO) & v.cmpge(Vec4::ZERO) & (u + v).cmple(Vec4::ONE);
         let hit = (inside & t.cmpgt(Vec4::ZERO) & t.cmplt(Vec4::splat(t_max))).bitmask();
         (hit != 0).then(|| (hit, t.to_array(), u.to_array(), v.to_array()))

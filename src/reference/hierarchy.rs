@@ -135,46 +135,60 @@ impl Hierarchy {
         // Finite, so that no 0 * infinity is NaN.
         let tiny = |d: f32| if d.abs() < 1e-20 { 1e-20f32.copysign(d) } else { d };
         let inverse = Vec3::new(tiny(direction.x), tiny(direction.y), tiny(direction.z)).recip();
-        let near: [usize; 3] = std::array::from_fn(|k| if inverse[k] >= 0.0 { k } else { k + 3 });
-        let far: [usize; 3] = std::array::from_fn(|k| if inverse[k] >= 0.0 { k + 3 } else { k });
-        let o = [origin.x, origin.y, origin.z].map(Vec4::splat);
-        let i = [inverse.x, inverse.y, inverse.z].map(Vec4::splat);
+        let sides = [inverse.x >= 0.0, inverse.y >= 0.0, inverse.z >= 0.0];
+        let (ox, oy, oz) = (Vec4::splat(origin.x), Vec4::splat(origin.y), Vec4::splat(origin.z));
+        let (ix, iy, iz) = (Vec4::splat(inverse.x), Vec4::splat(inverse.y), Vec4::splat(inverse.z));
         let base = stack.len();
-        stack.push((self.root, 0.0));
-        while stack.len() > base {
-            let Some((index, entry)) = stack.pop() else { break };
-            if entry > t_max {
-                continue;
-            }
+        let (mut index, mut entry) = (self.root, 0.0f32);
+        loop {
             if index & LEAF != 0 {
-                t_max = visit(stack, index & !LEAF, t_max);
-                if t_max < 0.0 {
-                    stack.truncate(base);
-                    break;
-                }
-                continue;
-            }
-            let node = &self.nodes[index as usize];
-            let slab = |p: &[usize; 3], k: usize| (node.planes[p[k]] - o[k]) * i[k];
-            let enter = slab(&near, 0).max(slab(&near, 1)).max(slab(&near, 2)).max(Vec4::ZERO);
-            let leave = slab(&far, 0).min(slab(&far, 1)).min(slab(&far, 2)) * SLACK;
-            let hit = (enter.cmple(leave) & enter.cmple(Vec4::splat(t_max))).bitmask();
-            let enter = enter.to_array();
-            let first = stack.len();
-            for lane in 0..WIDTH {
-                if hit >> lane & 1 != 0 {
-                    // The nearest comes out first.
-                    let entry = (node.children[lane], enter[lane]);
-                    let mut at = stack.len();
-                    stack.push(entry);
-                    while at > first && stack[at - 1].1 < entry.1 {
-                        stack.swap(at - 1, at);
-                        at -= 1;
+                if entry <= t_max {
+                    t_max = visit(stack, index & !LEAF, t_max);
+                    if t_max < 0.0 {
+                        stack.truncate(base);
+                        return t_max;
                     }
+                }
+            } else {
+                let node = &self.nodes[index as usize];
+                let [lx, ly, lz, hx, hy, hz] = &node.planes;
+                let (nx, fx) = if sides[0] { (lx, hx) } else { (hx, lx) };
+                let (ny, fy) = if sides[1] { (ly, hy) } else { (hy, ly) };
+                let (nz, fz) = if sides[2] { (lz, hz) } else { (hz, lz) };
+                let enter = ((*nx - ox) * ix).max((*ny - oy) * iy).max(((*nz - oz) * iz).max(Vec4::ZERO));
+                let leave = ((*fx - ox) * ix).min((*fy - oy) * iy).min((*fz - oz) * iz) * SLACK;
+                let mut hit = (enter.cmple(leave) & enter.cmple(Vec4::splat(t_max))).bitmask();
+                if hit != 0 {
+                    let enter = enter.to_array();
+                    // The nearest is next; the others wait.
+                    let lane = hit.trailing_zeros() as usize & 3;
+                    hit &= hit - 1;
+                    (index, entry) = (node.children[lane], enter[lane]);
+                    while hit != 0 {
+                        let lane = hit.trailing_zeros() as usize & 3;
+                        hit &= hit - 1;
+                        let other = (node.children[lane], enter[lane]);
+                        if other.1 < entry {
+                            stack.push((index, entry));
+                            (index, entry) = other;
+                        } else {
+                            stack.push(other);
+                        }
+                    }
+                    continue;
+                }
+            }
+            loop {
+                if stack.len() <= base {
+                    return t_max;
+                }
+                let Some(next) = stack.pop() else { return t_max };
+                if next.1 <= t_max {
+                    (index, entry) = next;
+                    break;
                 }
             }
         }
-        t_max
     }
 }
 
