@@ -14,7 +14,7 @@ const SURE: u32 = 3;
 /// A path goes on with the largest part of its weight times this as its chance: dark leaves rarely see more than four orders.
 const BOLDNESS: f32 = 2.0;
 /// Surfaces after which no path is sure to go on, whatever its weight: white walls could hold one for ever.
-const LONG: u32 = 64;
+const LONG: u32 = 1024;
 
 /// What the first surface along a path is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,7 +86,7 @@ impl World {
             }
             let Some((away, through)) = self.scatter(&hit, &mut weight, random) else { break };
             if surface >= SURE {
-                let most = if surface >= LONG { 0.9 } else { 1.0 };
+                let most = if surface >= LONG { 0.98 } else { 1.0 };
                 let chance = (BOLDNESS * weight.max_element()).min(most);
                 if random.unit() as f32 >= chance {
                     break;

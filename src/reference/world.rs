@@ -18,8 +18,9 @@ use crate::scene::{Scene, Sky};
 const LEAST_STEP: f64 = 1e-5;
 /// And at this part of their distance from the world's origin, for its coordinates are singles.
 const ROUNDING: f64 = 2.5e-7;
-/// Rays leave the ground at this height, m.
-const GROUND_STEP: f64 = 1e-4;
+/// Rays leave the ground at this height, m: far above the rounding of doubles, and so low that next to a crease hardly any
+/// starts under the other side of it.
+const GROUND_STEP: f64 = 1e-6;
 
 /// A scene as light meets it: the species' own triangles on the renderer's own seeds, around what some eyes see.
 pub struct World {
