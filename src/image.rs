@@ -41,6 +41,17 @@ pub struct Linear {
     /// The four fractions k of BN12: lit ground, shadowed ground, lit trees, shadowed trees; their sum is the share of
     /// the pixel that is not background.
     pub fractions: Vec<[f32; 4]>,
+    /// How sure the radiance is, if it was estimated by random samples.
+    pub noise: Option<Noise>,
+}
+
+/// How sure an image is that was estimated by random samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Noise {
+    /// Variance of the mean radiance, RGB, in squared units of radiance.
+    pub variance: Vec<[f32; 3]>,
+    /// Samples.
+    pub samples: Vec<u32>,
 }
 
 impl Picture {
@@ -66,6 +77,7 @@ impl Picture {
                 coverage: sky.iter().map(|t| f16::from_bits(t[3]).to_f32()).collect(),
                 species: gpu.read_image(&targets.colors[2].image, 0, 0)?,
                 fractions: part(3)?.iter().map(|t| t.map(|v| f16::from_bits(v).to_f32())).collect(),
+                noise: None,
             })
         });
         Ok(Picture { size: plan.size, display, linear: linear.transpose()? })
@@ -84,6 +96,9 @@ impl Picture {
             h.update(bytemuck::cast_slice(&l.sun)).update(bytemuck::cast_slice(&l.sky));
             h.update(bytemuck::cast_slice(&l.depth)).update(bytemuck::cast_slice(&l.coverage));
             h.update(bytemuck::cast_slice(&l.species)).update(bytemuck::cast_slice(&l.fractions));
+            if let Some(noise) = &l.noise {
+                h.update(bytemuck::cast_slice(&noise.variance)).update(bytemuck::cast_slice(&noise.samples));
+            }
         }
         h.finalize().to_hex().to_string()
     }
@@ -98,7 +113,8 @@ impl Picture {
     }
 
     /// Writes the linear image as EXR: layers `radiance`, `sun`, `sky` (R, G, B), `depth` (Z), `trees` (coverage),
-    /// `species` (id) and `fractions` (lit_ground, shadowed_ground, lit_tree, shadowed_tree).
+    /// `species` (id) and `fractions` (lit_ground, shadowed_ground, lit_tree, shadowed_tree); of an estimate also `variance` (R,
+    /// G, B) of the mean radiance, and `samples` (n).
     ///
     /// # Errors
     /// [`Error::Usage`] if the plan had no layers; [`Error::Io`].
@@ -123,7 +139,7 @@ impl Picture {
             let channel = |k: usize| FlatSamples::F32(data.iter().map(|p| p[k]).collect());
             layer(name, vec![("R", channel(0)), ("G", channel(1)), ("B", channel(2))])
         };
-        let layers = vec![
+        let mut layers = vec![
             rgb("radiance", &radiance),
             rgb("sun", &l.sun),
             rgb("sky", &l.sky),
@@ -139,6 +155,10 @@ impl Picture {
                     .collect(),
             ),
         ];
+        if let Some(noise) = &l.noise {
+            layers.push(rgb("variance", &noise.variance));
+            layers.push(layer("samples", vec![("n", FlatSamples::U32(noise.samples.clone()))]));
+        }
         let attributes =
             exr::prelude::ImageAttributes::new(exr::prelude::IntegerBounds::from_dimensions(size));
         let image = ExrImage::from_layers(attributes, layers);

@@ -24,13 +24,14 @@
 //! # Where things are
 //!
 //! Data flows one way: [`scene`] → [`plan`] → [`bake`] → [`forest`] → [`frame`] → [`image`] → [`measure`]. [`physics`] holds the
-//! models in double precision and knows nobody: it is what the shaders are tested against. [`gpu`] holds all Vulkan and
+//! models in double precision and knows nobody: it is what the shaders are tested against. [`mod@reference`] draws scenes
+//! without Vulkan, by path tracing. [`gpu`] holds all Vulkan and
 //! all `unsafe`, and knows no forest.
 //!
 //! | paper | module | shader | test |
 //! |---|---|---|---|
 //! | BN12 §3, terrain quadtree | [`forest::terrain`], [`forest::quadtree`], [`physics::terrain`] | `forest/terrain_tile.comp`, `physics/terrain.glsl` | `tests/gpu/ground.rs` |
-//! | BN12 §4, seeds from densities | [`forest::seeds`], [`forest::pattern`], [`forest::listed`] | `forest/seeds.comp`, `forest/candidate.glsl`, `forest/density.glsl` | `tests/gpu/seeds.rs` |
+//! | BN12 §4, seeds from densities | [`forest::seeds`], [`forest::candidate`], [`forest::pattern`], [`forest::listed`] | `forest/seeds.comp`, `forest/candidate.glsl`, `forest/density.glsl` | `tests/gpu/seeds.rs` |
 //! | BN12 §4, coverage | [`forest::coverage`] | `forest/coverage*`, `frame/cover.glsl` | `tests/gpu/coverage.rs` |
 //! | BN12 §5, views of a z-field | [`bake`], [`physics::views`] | `physics/views.glsl` | `tests/views.rs`, `tests/bake.rs`, `tests/gpu/views.rs` |
 //! | BN12 §5, surface along a ray | [`physics::zfield`] | `physics/zfield.glsl` | `tests/zfield.rs`, `tests/zfield_quality.rs`, `tests/gpu/zfield.rs` |
@@ -42,6 +43,7 @@
 //! | BN12 §8, culling in order | [`forest::cull`] | `forest/cull.comp`, `forest/scan.comp`, `forest/compact.comp` | `tests/gpu/cull.rs` |
 //! | BN12 §7, trees on silhouettes beyond the hand-over | [`forest::silhouette`] | `forest/silhouette.glsl` | `tests/gpu/silhouettes.rs` |
 //! | BN12 §8, sub-pixel masks | [`physics::masks`] | `physics/masks.glsl` | `measure/conform/law.rs`, `tests/conform.rs` |
+//! | Monte-Carlo reference (Kajiya 1986), error of every pixel | [`mod@reference`] | | `tests/reference.rs` |
 //! | parallel-split shadow maps (Zhang et al. 2006) | [`frame::cascades`], [`frame::shadows`] | `frame/tree_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
 //! | trees that need no file (Weber and Penn 1995) | [`tree`] | | `tests/trees.rs` |
 //! | the scene file | [`scene`] | | `tests/scene_inputs.rs`, `tests/model_inputs.rs` |
@@ -73,6 +75,7 @@ pub mod measure;
 pub mod physics;
 pub mod plan;
 pub mod progress;
+pub mod reference;
 pub mod scene;
 pub mod settings;
 pub mod tree;

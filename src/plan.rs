@@ -1,6 +1,7 @@
 //! What a scene requires: every table, view set, cache, target and pass, with the reason and the bytes, before anything
 //! is allocated. What no one needs is not in the plan, and is not built.
 
+use crate::forest::candidate::{Layout, POINTS};
 use crate::forest::pattern::Pattern;
 use crate::forest::quadtree::{MIN_REFINE, quad_count};
 use crate::forest::seeds::fullest_listed;
@@ -14,8 +15,6 @@ use crate::physics::views;
 use crate::scene::{Albedo, Camera, Distribution, Scene, Sky};
 use crate::{Error, Result};
 
-/// Points of a Wang tile.
-const PATTERN_POINTS: u32 = 256;
 /// Seed quads along the range, at most.
 const QUADS_IN_RANGE: f64 = 24.0;
 /// Quads with trees on silhouettes along the distance beyond the range, at most.
@@ -278,7 +277,6 @@ impl Plan {
             let mut scale = f64::from(species.scale[1]);
             match &species.distribution {
                 Distribution::Density { max_density, .. } => {
-                    self.pattern_density += f64::from(*max_density);
                     area_density += f64::from(*max_density);
                 }
                 Distribution::Positions(list) => {
@@ -312,9 +310,8 @@ impl Plan {
         let farthest = farthest[0].hypot(farthest[1]).hypot(eye.position[2]);
         let farthest = farthest.max(extent[0].hypot(extent[1]));
         let reach = self.range.min(farthest);
-        if self.pattern_density > 0.0 {
-            let pattern = Pattern::new(PATTERN_POINTS, scene.seed);
-            self.tile_side = (pattern.mean_points() / self.pattern_density).sqrt();
+        if let Some(Layout { pattern, tile_side, density }) = Layout::new(scene) {
+            (self.tile_side, self.pattern_density) = (tile_side, density);
             self.tiles_per_quad = 4;
             while reach > QUADS_IN_RANGE * self.tile_side * f64::from(self.tiles_per_quad) {
                 self.tiles_per_quad *= 2;
@@ -435,7 +432,7 @@ impl Plan {
             }
             if self.pattern.is_some() {
                 let reason = "densities thin a Poisson-disk pattern".to_string();
-                add("data", "point pattern", reason, 16 * 8 * u64::from(PATTERN_POINTS));
+                add("data", "point pattern", reason, 16 * 8 * u64::from(POINTS));
             }
             let slots = u64::from(self.seed_regions) * u64::from(self.region_capacity);
             let near = self.seed_regions - self.silhouette_quads;

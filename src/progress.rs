@@ -40,6 +40,19 @@ impl Progress {
     /// Counts `steps` more steps as finished.
     pub fn step(&self, steps: u64) {
         let done = self.done.fetch_add(steps, Ordering::Relaxed) + steps;
+        self.show(done, "");
+    }
+
+    /// Sets the number of finished steps, and says how it goes.
+    pub fn set(&self, done: u64, note: &str) {
+        self.done.store(done, Ordering::Relaxed);
+        if let Some(bar) = &self.bar {
+            bar.set_message(note.to_string());
+        }
+        self.show(done, note);
+    }
+
+    fn show(&self, done: u64, note: &str) {
         if let Some(bar) = &self.bar {
             bar.set_position(done);
         }
@@ -50,7 +63,8 @@ impl Progress {
                 && self.decile.fetch_max(decile, Ordering::Relaxed) < decile
             {
                 // Not `eprintln!`, which panics when no one listens any more.
-                let _ = writeln!(std::io::stderr(), "{label}: {} %", decile * 10);
+                let comma = if note.is_empty() { "" } else { ", " };
+                let _ = writeln!(std::io::stderr(), "{label}: {} %{comma}{note}", decile * 10);
             }
         }
     }

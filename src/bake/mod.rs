@@ -4,12 +4,12 @@ pub mod cache;
 #[doc(hidden)]
 pub mod file;
 mod occlusion;
-mod optics;
+pub(crate) mod optics;
 mod raster;
 mod rays;
 mod scene;
 mod self_shadow;
-mod surface;
+pub(crate) mod surface;
 pub mod tables;
 mod verify;
 mod views;

@@ -123,15 +123,23 @@ pub fn top_area(field: &ZField) -> f64 {
     sum as f64 / 255.0 * (2.0 * m / f64::from(field.resolution)).powi(2)
 }
 
-/// Puts views and measurements together; what the scene states wins over what the mesh shows.
-pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOverride) -> SpeciesBake {
-    let leaves = leaves(mesh, surface);
-    let frame = surface.frame;
-    // A tree without foliage: all of it stands for leaves.
-    let foliage: Vec<bool> = mesh.materials.iter().map(|m| m.foliage || !leaves.foliage).collect();
-    let matter = self_shadow::Matter { foliage: &foliage, base: leaves.base };
-    let self_shadow::Measured { shadow, turned } = self_shadow::measure(surface, &matter, &views);
-    let [leaf_shadow, extinction] = shadow.map(|x| x as f32);
+/// Reflectances of a species, linear RGB.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Colours {
+    /// Leaf reflectance; that of the whole surface where there is no foliage.
+    pub reflectance: [f32; 3],
+    /// Leaf transmittance; with the reflectance at most 1.
+    pub transmittance: [f32; 3],
+    /// Bark reflectance.
+    pub bark: [f32; 3],
+}
+
+/// Reflectances measured from a mesh; what the scene states wins.
+pub fn colours(mesh: &Mesh, surface: &Surface, stated: &OpticsOverride) -> Colours {
+    colours_of(&leaves(mesh, surface), stated)
+}
+
+fn colours_of(leaves: &Leaves, stated: &OpticsOverride) -> Colours {
     let color = leaves.color.map(|c| c as f32);
     let (reflectance, share) = if leaves.foliage {
         (stated.leaf_reflectance.unwrap_or(color), 0.5)
@@ -142,6 +150,24 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
         Some(t) if leaves.foliage => t,
         _ => reflectance.map(|r| share * r),
     };
+    Colours {
+        reflectance,
+        // A leaf scatters no more than it gets.
+        transmittance: std::array::from_fn(|i| transmittance[i].min(1.0 - reflectance[i])),
+        bark: stated.bark_reflectance.unwrap_or(leaves.bark.map(|c| c as f32)),
+    }
+}
+
+/// Puts views and measurements together; what the scene states wins over what the mesh shows.
+pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOverride) -> SpeciesBake {
+    let leaves = leaves(mesh, surface);
+    let frame = surface.frame;
+    // A tree without foliage: all of it stands for leaves.
+    let foliage: Vec<bool> = mesh.materials.iter().map(|m| m.foliage || !leaves.foliage).collect();
+    let matter = self_shadow::Matter { foliage: &foliage, base: leaves.base };
+    let self_shadow::Measured { shadow, turned } = self_shadow::measure(surface, &matter, &views);
+    let [leaf_shadow, extinction] = shadow.map(|x| x as f32);
+    let colours = colours_of(&leaves, stated);
     let area = top_area(&views) * f64::from(frame.radius).powi(2);
     SpeciesBake {
         views,
@@ -151,10 +177,9 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
         turned: turned.map(|x| x as f32),
         leaf_shadow,
         extinction: stated.extinction.unwrap_or(extinction),
-        reflectance,
-        bark: stated.bark_reflectance.unwrap_or(leaves.bark.map(|c| c as f32)),
-        // A leaf scatters no more than it gets.
-        transmittance: std::array::from_fn(|i| transmittance[i].min(1.0 - reflectance[i])),
+        reflectance: colours.reflectance,
+        bark: colours.bark,
+        transmittance: colours.transmittance,
         area: area as f32,
         crown_radius: (area / std::f64::consts::PI).sqrt() as f32,
         crown_base: leaves.base,

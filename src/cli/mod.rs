@@ -8,6 +8,7 @@ mod devices;
 mod options;
 mod output;
 mod plan;
+mod reference;
 mod reflectance;
 mod render;
 mod tree;

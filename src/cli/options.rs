@@ -1,8 +1,11 @@
 //! Options that several commands share.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use canopy::gpu::{Gpu, GpuOptions, Validation};
+use canopy::plan::Representation;
+use canopy::reference::{self, Light, Until};
 use canopy::scene::{Camera, Scene};
 use canopy::settings::{KNOBS, PRESETS, Settings};
 use canopy::{Error, Result};
@@ -99,6 +102,117 @@ pub fn named<T: Copy + Send + Sync + 'static, const N: usize>(
         // The parser lets only these through.
         names.iter().find(|n| n.0 == name).unwrap_or(&names[0]).1
     })
+}
+
+/// What draws: the renderer in one of its ways, or the Monte-Carlo reference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drawn {
+    /// The renderer, on a Vulkan device.
+    By(Representation),
+    /// The reference, on the CPU.
+    Reference,
+}
+
+impl Drawn {
+    /// All, with the names that users write.
+    pub fn names() -> [(&'static str, Drawn); 4] {
+        let [a, b, c] = Representation::NAMES.map(|(name, r)| (name, Drawn::By(r)));
+        [a, b, c, ("reference", Drawn::Reference)]
+    }
+
+    /// The name that users write.
+    pub fn name(self) -> &'static str {
+        match self {
+            Drawn::By(r) => r.name(),
+            Drawn::Reference => "reference",
+        }
+    }
+}
+
+/// How the Monte-Carlo reference is made.
+#[derive(clap::Args, Clone, Copy, Debug)]
+pub struct ReferenceOptions {
+    /// Reference: when to stop. An error such as 1%, samples a pixel such as 16spp, or a time such as 60s
+    #[arg(long, value_name = "1%|16spp|60s", value_parser = goal)]
+    pub until: Option<Goal>,
+    /// Reference: which light is on
+    #[arg(long, value_name = "NAME", value_parser = named(Light::NAMES))]
+    pub light: Option<Light>,
+    /// Reference: surfaces that light may meet on its way. 1 is single scattering, full any number [default: full]
+    #[arg(long, value_name = "1|N|full", value_parser = bounces)]
+    pub bounces: Option<Bounces>,
+    /// Reference: seed of the samples; other seeds give independent images [default: 1]
+    #[arg(long, value_name = "N")]
+    pub sample_seed: Option<u32>,
+}
+
+impl ReferenceOptions {
+    /// Refuses them where nothing is drawn by the reference.
+    pub fn refuse(&self) -> Result<()> {
+        let given = [
+            (self.until.is_some(), "--until"),
+            (self.light.is_some(), "--light"),
+            (self.bounces.is_some(), "--bounces"),
+            (self.sample_seed.is_some(), "--sample-seed"),
+        ];
+        match given.into_iter().find(|g| g.0) {
+            Some((_, name)) => Err(Error::Usage(format!("{name} is for --representation reference"))),
+            None => Ok(()),
+        }
+    }
+
+    /// The library's options; an error is the image's, or with `of_mean` that of its mean.
+    pub fn options(&self, default: Until, of_mean: bool) -> reference::Options {
+        let until = self.until.map_or(default, |g| match g.0 {
+            Until::Error(e) if of_mean => Until::ErrorOfMean(e),
+            other => other,
+        });
+        reference::Options {
+            light: self.light.unwrap_or_default(),
+            bounces: self.bounces.and_then(|b| b.0),
+            seed: self.sample_seed.unwrap_or(1),
+            until,
+        }
+    }
+}
+
+/// A goal as users write it.
+#[derive(Clone, Copy, Debug)]
+pub struct Goal(Until);
+
+/// A number of bounces as users write it.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounces(Option<u32>);
+
+fn goal(text: &str) -> std::result::Result<Goal, String> {
+    let form = || "write an error such as 1%, samples such as 16spp, or a time such as 60s".to_string();
+    let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(form);
+    if let Some(percent) = text.strip_suffix('%') {
+        let error = number(percent)? / 100.0;
+        let fits = (1e-6..1.0).contains(&error);
+        return if fits { Ok(Goal(Until::Error(error))) } else { Err("0.0001% to 99%".into()) };
+    }
+    if let Some(samples) = text.strip_suffix("spp") {
+        return match samples.trim().parse().map_err(|_| form())? {
+            n @ 2..=16_777_216 => Ok(Goal(Until::Samples(n))),
+            _ => Err("2spp, which a variance needs, to 16777216spp".into()),
+        };
+    }
+    let seconds = number(text.strip_suffix('s').ok_or_else(form)?)?;
+    let fits = (0.001..=1e9).contains(&seconds);
+    if fits {
+        Ok(Goal(Until::Time(Duration::from_secs_f64(seconds))))
+    } else {
+        Err("0.001s to 1000000000s".into())
+    }
+}
+
+fn bounces(text: &str) -> std::result::Result<Bounces, String> {
+    match (text, text.parse::<u32>()) {
+        ("full", _) => Ok(Bounces(None)),
+        (_, Ok(n @ 1..)) => Ok(Bounces(Some(n))),
+        _ => Err("write a number from 1 on, or full".into()),
+    }
 }
 
 /// What to print.

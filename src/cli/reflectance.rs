@@ -2,16 +2,16 @@
 
 use std::path::PathBuf;
 
-use canopy::bake::{cache, load_or_bake_scene};
+use canopy::bake::{Baked, cache, load_or_bake_scene};
 use canopy::gpu::Gpu;
-use canopy::measure::reflectance::{Measured, Method, Request, mean_densities, measure};
-use canopy::plan::Representation;
+use canopy::measure::reflectance::{Measured, Method, Request, mean_densities, measure, measure_reference};
 use canopy::progress::Progress;
-use canopy::scene::Scene;
+use canopy::reference::Until;
+use canopy::scene::{Camera, Scene};
 use canopy::{Error, Result};
 
 use super::SCHEMA_VERSION;
-use super::options::{DeviceOptions, PrintOptions, SceneOptions, knobs_help, named};
+use super::options::{DeviceOptions, Drawn, PrintOptions, ReferenceOptions, SceneOptions, knobs_help, named};
 use super::output;
 
 const EXAMPLES: &str = "\
@@ -22,8 +22,19 @@ Examples:
          --distance 50,200,1000,20000 --representation auto --out brf.csv
   canopy reflectance scene.toml --representation zfield,shader-map --distance 100,400
   canopy reflectance scene.toml --density 0.01 --slope -20,0,20 --json
+  canopy reflectance scene.toml --representation zfield,reference --bounces 1 --until 1%
+      the renderer against path tracing of the real trees, both with light that met one surface
 A list is numbers and ranges FROM:TO:STEP, with commas between. A negative view zenith is the side away from the sun; a
-positive slope descends towards the sun. Pixels are those of --size and --camera.";
+positive slope descends towards the sun. Pixels are those of --size and --camera.
+The reference is Monte-Carlo, of the same trees through the same rays; distance means nothing to it, and its rows repeat. Each
+image of a patch is traced until the standard error of its mean is that of --until (of the channel where it is largest,
+default 1%). stderr is what patches differ by, divided by the root of their number: it contains the Monte-Carlo error, which
+the noise of the --json report gives alone. Without --bounces light is scattered any number of times: the truth, which holds
+more light than the renderer models. --bounces 1 is the renderer's own model of the sun, light that met one surface: what
+differs then is how trees are represented.";
+
+/// Error of the mean of an image of a patch if no one says.
+const DEFAULT_UNTIL: Until = Until::ErrorOfMean(0.01);
 
 const COLUMNS: [&str; 22] = [
     "representation",
@@ -70,9 +81,11 @@ pub struct Args {
     /// Inclinations of the ground, degrees
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = list)]
     slope: List,
-    /// How trees are drawn: auto, zfield, shader-map; or several with commas between
-    #[arg(long, value_name = "NAMES", default_value = "auto", value_delimiter = ',', value_parser = named(Representation::NAMES))]
-    representation: Vec<Representation>,
+    /// How trees are drawn: auto, zfield, shader-map, or reference (path tracing on the CPU); several with commas between
+    #[arg(long, value_name = "NAMES", default_value = "auto", value_delimiter = ',', value_parser = named(Drawn::names()))]
+    representation: Vec<Drawn>,
+    #[command(flatten)]
+    reference: ReferenceOptions,
     /// Trees per m² of all species together, instead of the scene's mean
     #[arg(long, value_name = "TREES/M2", allow_negative_numbers = true)]
     density: Option<f64>,
@@ -123,6 +136,9 @@ pub fn run(args: &Args) -> Result<()> {
         output::check(out, "csv")?;
     }
     check(args)?;
+    if !args.representation.contains(&Drawn::Reference) {
+        args.reference.refuse()?;
+    }
     let (scene, camera) = args.scene.load()?;
     let mut densities = mean_densities(&scene);
     if let Some(wanted) = args.density {
@@ -133,7 +149,7 @@ pub fn run(args: &Args) -> Result<()> {
     if densities.iter().sum::<f64>() <= 0.0 {
         return Err(Error::Usage("the scene has no trees to measure".into()));
     }
-    let rows = args.device.with(|gpu| all(args, gpu, &scene, &camera, &densities))?;
+    let rows = all(args, &scene, &camera, &densities)?;
     let text = csv(&rows);
     if let Some(out) = &args.out {
         canopy::files::write_whole(out, text.as_bytes())?;
@@ -182,51 +198,78 @@ fn check(args: &Args) -> Result<()> {
     Ok(())
 }
 
-fn all(
-    args: &Args,
-    gpu: &Gpu,
-    scene: &Scene,
-    camera: &canopy::scene::Camera,
-    densities: &[f64],
-) -> Result<Vec<Row>> {
-    let baked: Vec<_> = load_or_bake_scene(scene, cache::default_dir().as_deref(), args.print.quiet)?
-        .into_iter()
-        .map(|(b, _)| b)
-        .collect();
+/// One sun and slope, for one or several distances.
+#[derive(Clone)]
+struct Setting {
+    drawn: Drawn,
+    sun_zenith: f64,
+    slope: f64,
+    views: Vec<[f64; 2]>,
+}
+
+/// All rows, in the order of representations, suns, slopes and distances.
+fn all(args: &Args, scene: &Scene, camera: &Camera, densities: &[f64]) -> Result<Vec<Row>> {
     let method = Method { patches: args.patches, side: args.patch_side, pixels: args.patch_pixels };
     let suns = args.sun_zenith.clone().unwrap_or(List(vec![90.0 - scene.sun.elevation]));
     let all_views: Vec<[f64; 2]> =
         args.azimuth.0.iter().flat_map(|a| args.view_zenith.0.iter().map(|v| [*v, *a])).collect();
-    let requests: Vec<Request> = args
-        .representation
-        .iter()
-        .flat_map(|r| suns.0.iter().map(move |s| (*r, *s)))
-        .flat_map(|(r, s)| args.slope.0.iter().map(move |slope| (r, s, *slope)))
-        .flat_map(|(r, s, slope)| args.distance.0.iter().map(move |d| (r, s, slope, *d)))
-        .map(|(representation, sun_zenith, slope, distance)| Request {
-            sun_zenith,
-            slope,
-            distance,
-            representation,
+    let mut settings = Vec::new();
+    for drawn in &args.representation {
+        for (sun_zenith, slope) in suns.0.iter().flat_map(|s| args.slope.0.iter().map(|p| (*s, *p))) {
             // Ground that turns its back shows nothing.
-            views: all_views.iter().copied().filter(|v| sees(*v, slope)).collect(),
-        })
-        .collect();
-    let images = requests.iter().map(|r| r.views.len() as u64).sum::<u64>() * u64::from(args.patches);
-    let progress = Progress::new("measuring", images, args.print.quiet);
-    let mut rows = Vec::new();
-    for r in &requests {
-        let size = args.scene.size;
-        let found =
-            measure(gpu, scene, densities, &baked, (camera, size), &method, r, &mut || progress.step(1))?;
-        rows.extend(found.into_iter().map(|measured| Row {
-            representation: r.representation.name(),
-            distance_m: r.distance,
-            sun_zenith_deg: r.sun_zenith,
-            slope_deg: r.slope,
-            measured,
-        }));
+            let views = all_views.iter().copied().filter(|v| sees(*v, slope)).collect();
+            settings.push(Setting { drawn: *drawn, sun_zenith, slope, views });
+        }
     }
+    let distances = args.distance.0.len() as u64;
+    let images = |s: &Setting| {
+        let times = if s.drawn == Drawn::Reference { 1 } else { distances };
+        s.views.len() as u64 * u64::from(args.patches) * times
+    };
+    let renders = settings.iter().any(|s| s.drawn != Drawn::Reference);
+    // Before the progress bar: baking has its own.
+    let baked: Vec<Baked> = if renders {
+        let found = load_or_bake_scene(scene, cache::default_dir().as_deref(), args.print.quiet)?;
+        found.into_iter().map(|(b, _)| b).collect()
+    } else {
+        Vec::new()
+    };
+    let progress = Progress::new("measuring", settings.iter().map(images).sum(), args.print.quiet);
+    let (size, options) = (args.scene.size, args.reference.options(DEFAULT_UNTIL, true));
+    let work = |gpu: Option<&Gpu>| -> Result<Vec<Row>> {
+        let mut rows = Vec::new();
+        for s in &settings {
+            let mut add = |distance: f64, found: Vec<Measured>| {
+                rows.extend(found.into_iter().map(|measured| Row {
+                    representation: s.drawn.name(),
+                    distance_m: distance,
+                    sun_zenith_deg: s.sun_zenith,
+                    slope_deg: s.slope,
+                    measured,
+                }));
+            };
+            match (s.drawn, gpu) {
+                (Drawn::By(representation), Some(gpu)) => {
+                    for &distance in &args.distance.0 {
+                        let (sun_zenith, slope, views) = (s.sun_zenith, s.slope, s.views.clone());
+                        let r = Request { sun_zenith, slope, distance, representation, views };
+                        let from = (camera, size);
+                        let mut step = || progress.step(1);
+                        add(distance, measure(gpu, scene, densities, &baked, from, &method, &r, &mut step)?);
+                    }
+                }
+                _ => {
+                    let angles = [s.sun_zenith, s.slope];
+                    let mut step = |_| progress.step(1);
+                    let found =
+                        measure_reference(scene, densities, &method, angles, &s.views, &options, &mut step)?;
+                    args.distance.0.iter().for_each(|d| add(*d, found.clone()));
+                }
+            }
+        }
+        Ok(rows)
+    };
+    let rows = if renders { args.device.with(|gpu| work(Some(gpu))) } else { work(None) }?;
     progress.finish();
     Ok(rows)
 }

@@ -15,8 +15,9 @@ use canopy::settings::Settings;
 use canopy::{Error, Result};
 
 use super::SCHEMA_VERSION;
-use super::options::{DeviceOptions, PrintOptions, SceneOptions, knobs_help, named};
+use super::options::{DeviceOptions, Drawn, PrintOptions, ReferenceOptions, SceneOptions, knobs_help, named};
 use super::output::{self, Table};
+use super::reference;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -26,7 +27,13 @@ Examples:
   canopy render --size 320x240 --quality fast         small and quick
   canopy render --set samples=8 --set cascades=2      turn knobs; --help lists them all
   canopy render --view-mode fractions -o k.png        lit and shadowed ground and trees
-  canopy render --frames 5 --json > report.json       warm timings for a script";
+  canopy render --frames 5 --json > report.json       warm timings for a script
+  canopy render --representation reference --camera near --size 512x384 --until 5% --resume near.sums -o truth.png
+                                                      path tracing of the real trees on the CPU; run it again to go on
+The reference is Monte-Carlo: every tree's own triangles, on the seeds that the renderer draws. Its error is the root mean
+square, over pixels and channels, of the standard error of the radiance, over the root mean square radiance; a quarter of the
+error takes sixteen times the time. Its EXR also has the layers variance (of the mean radiance) and samples. It opens no
+Vulkan device. --bounces 1 is light that met one surface, as the renderer's own sun light is.";
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{}", knobs_help()))]
@@ -43,9 +50,14 @@ pub struct Args {
     /// lod, cascades, normals
     #[arg(long, value_name = "MODE", default_value = "radiance", value_parser = named(ViewMode::NAMES))]
     view_mode: ViewMode,
-    /// How trees are drawn: auto, zfield or shader-map at any distance
-    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = named(Representation::NAMES))]
-    representation: Representation,
+    /// How trees are drawn: auto, zfield or shader-map at any distance, or reference: path tracing on the CPU
+    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = named(Drawn::names()))]
+    representation: Drawn,
+    #[command(flatten)]
+    reference: ReferenceOptions,
+    /// Reference: file to go on from, if it is there, and to write to: now and then, and at the end
+    #[arg(long, value_name = "FILE")]
+    resume: Option<PathBuf>,
     /// Stops brighter (or, negative, darker) than the automatic exposure
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = stops)]
     exposure: f64,
@@ -157,6 +169,19 @@ pub fn run(args: &Args) -> Result<()> {
     if let Some(exr) = &args.exr {
         output::check(exr, "exr")?;
     }
+    let representation = match args.representation {
+        Drawn::By(representation) => {
+            args.reference.refuse()?;
+            if args.resume.is_some() {
+                return Err(Error::Usage("--resume is for --representation reference".into()));
+            }
+            Some(representation)
+        }
+        Drawn::Reference => {
+            refuse_for_reference(args)?;
+            None
+        }
+    };
     let capture = args.capture_frame.map(|n| match n <= args.frames {
         true => FrameCapture::attached(),
         false => {
@@ -174,7 +199,38 @@ pub fn run(args: &Args) -> Result<()> {
     });
     output::check(&png, "png")?;
     let load_s = start.elapsed().as_secs_f64();
-    args.device.with(|gpu| draw(args, gpu, scene, &camera, png, load_s, capture))
+    let Some(representation) = representation else {
+        return reference::render(reference::Request {
+            scene: &scene,
+            camera: &camera,
+            size: args.scene.size,
+            options: args.reference.options(reference::DEFAULT_UNTIL, false),
+            resume: args.resume.as_deref(),
+            exposure: auto_exposure(&scene) * args.exposure.exp2(),
+            png: &png,
+            exr: args.exr.as_deref(),
+            load_s,
+            print: args.print,
+        });
+    };
+    args.device.with(|gpu| draw(args, gpu, scene, &camera, representation, png, load_s, capture))
+}
+
+/// Refuses what only the renderer does.
+fn refuse_for_reference(args: &Args) -> Result<()> {
+    let given = [
+        (args.view_mode != ViewMode::Radiance, "--view-mode"),
+        (args.frames != 1, "--frames"),
+        (args.capture_frame.is_some(), "--capture-frame"),
+        (args.device.device.is_some(), "--device"),
+        (args.device.validate, "--validate"),
+    ];
+    match given.into_iter().find(|g| g.0) {
+        Some((_, name)) => {
+            Err(Error::Usage(format!("{name}: the reference is not drawn on a Vulkan device")))
+        }
+        None => Ok(()),
+    }
 }
 
 fn stops(text: &str) -> std::result::Result<f64, String> {
@@ -185,18 +241,20 @@ fn stops(text: &str) -> std::result::Result<f64, String> {
 }
 
 /// Everything between opening and closing the device.
+#[allow(clippy::too_many_arguments)]
 fn draw(
     args: &Args,
     gpu: &Gpu,
     scene: Scene,
     camera: &Camera,
+    representation: Representation,
     png: PathBuf,
     load_s: f64,
     mut capture: Option<FrameCapture>,
 ) -> Result<()> {
     let quiet = args.print.quiet;
     let eye = Eye::new(camera, &scene.terrain, args.scene.size);
-    let mut plan = Plan::for_eye(&scene, &eye, args.exr.is_some(), args.representation, Some(gpu.info()))?;
+    let mut plan = Plan::for_eye(&scene, &eye, args.exr.is_some(), representation, Some(gpu.info()))?;
     plan.view_mode = args.view_mode;
     let scene = Arc::new(scene);
     let start = Instant::now();

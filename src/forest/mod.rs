@@ -2,6 +2,7 @@
 //! frame draws.
 
 pub mod cache;
+pub mod candidate;
 pub mod coverage;
 pub mod cull;
 pub mod density;

@@ -5,6 +5,9 @@
 //! on distance depends on the size of a pixel on the tree, and the texels of the shadow map; so the distance `s` is set
 //! by the pixel, s / `pixels_at_1m`, and by the texels that the scene camera's cascades have there. All distances see the
 //! same trees through the same rays, so that their ratio is much better known than either.
+//!
+//! The Monte-Carlo reference looks at the same patches along the same rays ([`measure_reference`]). To it a pixel is what is
+//! in it, so its radiance does not depend on the distance.
 
 use std::sync::Arc;
 
@@ -14,6 +17,7 @@ use crate::frame::camera::Eye;
 use crate::frame::cascades::Cascade;
 use crate::gpu::Gpu;
 use crate::plan::{Plan, Representation};
+use crate::reference::{Options, World};
 use crate::scene::{Camera, Distribution, Raster, Scene, Terrain};
 use crate::{Error, Result};
 
@@ -69,8 +73,10 @@ pub struct Measured {
     pub sun: [f64; 3],
     /// Radiance from the sky, RGB.
     pub sky: [f64; 3],
-    /// Standard error of the radiance, RGB; zero for one patch.
+    /// Standard error of the radiance, RGB: what patches differ by; of a single patch, `noise`.
     pub stderr: [f64; 3],
+    /// The part of it that comes from random samples and not from the choice of the patches, RGB; zero for the renderer.
+    pub noise: [f64; 3],
 }
 
 impl Measured {
@@ -208,7 +214,47 @@ pub fn measure(
             samples.push(mean(&renderer)?);
             progress();
         }
-        results.push(average(*view, &samples));
+        results.push(average(*view, &samples, [0.0; 3]));
+    }
+    Ok(results)
+}
+
+/// Measures one sun and slope for all views with the Monte-Carlo reference, each image until `options` says; `progress` is
+/// called after every image, with the number of its rays.
+///
+/// # Errors
+/// [`Error::Usage`] for angles that see no ground, and for more trees than a [`World`] holds.
+pub fn measure_reference(
+    scene: &Scene,
+    densities: &[f64],
+    method: &Method,
+    [sun_zenith, slope]: [f64; 2],
+    views: &[[f64; 2]],
+    options: &Options,
+    progress: &mut dyn FnMut(u64),
+) -> Result<Vec<Measured>> {
+    let patch = patch_scene(scene, densities, sun_zenith, slope)?;
+    let away = CAMERA_DISTANCES * method.side;
+    let centres = centres(method.patches, slope);
+    let eyes: Vec<Eye> = views
+        .iter()
+        .flat_map(|view| centres.iter().map(|c| eye(&patch.terrain, *view, *c, away, method, 1.0)))
+        .collect();
+    let world = World::new(&patch, &eyes)?;
+    let mut results = Vec::new();
+    for (view, eyes) in views.iter().zip(eyes.chunks_exact(centres.len())) {
+        let (mut samples, mut variance) = (Vec::new(), [0.0; 3]);
+        for (k, eye) in eyes.iter().enumerate() {
+            // Patches have random numbers of their own, or their errors would not average out.
+            let options = Options { seed: options.seed.wrapping_add(k as u32), ..*options };
+            let mut rays = 0;
+            let m = world.render(eye, &options, None, &mut |p| rays = p.rays)?.mean();
+            let all: Vec<f64> = [&m.fractions[..], &m.sun, &m.sky].concat();
+            samples.push(std::array::from_fn(|i| all[i]));
+            variance = std::array::from_fn(|c| variance[c] + m.stderr[c].powi(2));
+            progress(rays);
+        }
+        results.push(average(*view, &samples, variance.map(|v| v.sqrt() / samples.len() as f64)));
     }
     Ok(results)
 }
@@ -268,13 +314,13 @@ fn mean(renderer: &Renderer) -> Result<[f64; 10]> {
     Ok(sum.map(|s| s / linear.sun.len() as f64))
 }
 
-fn average(view: [f64; 2], samples: &[[f64; 10]]) -> Measured {
+fn average(view: [f64; 2], samples: &[[f64; 10]], noise: [f64; 3]) -> Measured {
     let n = samples.len() as f64;
     let mean: [f64; 10] = std::array::from_fn(|k| samples.iter().map(|s| s[k]).sum::<f64>() / n);
     let stderr = std::array::from_fn(|c| {
         let radiance = |s: &[f64; 10]| s[4 + c] + s[7 + c];
         let square: f64 = samples.iter().map(|s| (radiance(s) - radiance(&mean)).powi(2)).sum();
-        if n > 1.0 { (square / (n * (n - 1.0))).sqrt() } else { 0.0 }
+        if n > 1.0 { (square / (n * (n - 1.0))).sqrt() } else { noise[c] }
     });
     Measured {
         view,
@@ -282,5 +328,6 @@ fn average(view: [f64; 2], samples: &[[f64; 10]]) -> Measured {
         sun: [mean[4], mean[5], mean[6]],
         sky: [mean[7], mean[8], mean[9]],
         stderr,
+        noise,
     }
 }
