@@ -4,6 +4,7 @@ pub mod bench;
 pub mod compare;
 pub mod conform;
 pub mod host;
+pub mod metrics;
 pub mod pace;
 pub mod path;
 pub mod reflectance;
