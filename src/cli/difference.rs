@@ -105,7 +105,8 @@ fn text(r: &Report) -> String {
     let mut errors =
         Table::new(1, &["radiance, %", "RMSE", "95 % interval", "bias", "95 % interval", "pixels"]);
     let named = |region| format!("{region:?}").to_lowercase();
-    let rows = d.image.iter().map(|e| ("image".to_string(), e));
+    let whole = [("image", &d.image), ("foreground", &d.foreground)];
+    let rows = whole.into_iter().filter_map(|(name, e)| Some((name.to_string(), e.as_ref()?)));
     for (name, e) in rows.chain(d.regions.iter().map(|(region, e)| (named(region), e))) {
         let ([rmse, rmse_interval], [bias, bias_interval]) =
             (shown(Some(e.rmse), 100.0, 2), shown(Some(e.bias), 100.0, 2));

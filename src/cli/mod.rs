@@ -11,6 +11,7 @@ mod output;
 mod plan;
 mod reflectance;
 mod render;
+mod sweep;
 mod tree;
 
 use std::io::Write;
@@ -46,6 +47,8 @@ enum Command {
     Bench(bench::Args),
     /// Compare two bench results: significance, not only a ratio; a gate with --fail-above.
     Compare(compare::Args),
+    /// The trade of time for accuracy: every knob around every preset, Pareto front, report.
+    Sweep(sweep::Args),
     /// Every metric of one linear image against another: error, bias, FLIP, structural similarity, ratio over distance.
     Difference(difference::Args),
     /// Radiance of a patch of the scene's forest against view angle, sun angle and distance, as CSV.
@@ -68,6 +71,7 @@ pub fn run() -> ExitCode {
         Command::Render(args) => render::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Sweep(args) => sweep::run(&args),
         Command::Difference(args) => difference::run(&args),
         Command::Reflectance(args) => reflectance::run(&args),
         Command::Bake(args) => bake::run(&args),

@@ -204,7 +204,7 @@ fn draw(
     let found = load_or_bake_scene(&scene, cache::default_dir().as_deref(), quiet)?;
     for (s, (bake, from)) in scene.species.iter().zip(found) {
         baked.push(bake);
-        let (cache, tables) = (super::bake::state(from.species), super::bake::state(from.tables));
+        let (cache, tables) = (from.species.name(), from.tables.name());
         states.push(Bake { species: &s.name, cache, tables });
     }
     let bake_s = start.elapsed().as_secs_f64();

@@ -93,3 +93,72 @@ impl Layers {
 fn is_named(layer: &Layer<AnyChannels<FlatSamples>>, name: &str) -> bool {
     layer.attributes.layer_name.as_ref().is_some_and(|n| n.eq(name))
 }
+
+#[cfg(test)]
+mod tests {
+    use exr::prelude::{
+        AnyChannel, Encoding, Image, ImageAttributes, IntegerBounds, LayerAttributes, Vec2, WritableImage,
+    };
+
+    use super::*;
+    use crate::image::Linear;
+
+    #[test]
+    fn what_a_picture_writes_is_read_again() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.exr");
+        let value = |k: usize| k as f32 * 0.25;
+        let linear = Linear {
+            sun: (0..6).map(|k| [value(k), 1.0, 2.0]).collect(),
+            sky: (0..6).map(|k| [0.5, value(k), 0.125]).collect(),
+            depth: (0..6).map(value).collect(),
+            coverage: vec![0.0; 6],
+            species: vec![0; 6],
+            fractions: (0..6).map(|k| [0.0, 0.25, 0.5, value(k)]).collect(),
+        };
+        let picture = Picture { size: [3, 2], display: vec![0; 24], linear: Some(linear) };
+        picture.write_exr(&path).unwrap();
+        assert_eq!(Layers::read(&path).unwrap(), Layers::of(&picture).unwrap());
+    }
+
+    /// Writes layers of floats as `(name, [(channel, value)])`.
+    fn write(path: &Path, size: (usize, usize), layers: &[(&str, &[(&str, f32)])]) {
+        let layers: Vec<_> = layers
+            .iter()
+            .map(|(name, channels)| {
+                let samples = |v: f32| FlatSamples::F32(vec![v; size.0 * size.1]);
+                let channels = channels.iter().map(|(c, v)| AnyChannel::new(*c, samples(*v))).collect();
+                let attributes = LayerAttributes::named(*name);
+                Layer::new(
+                    Vec2(size.0, size.1),
+                    attributes,
+                    Encoding::UNCOMPRESSED,
+                    AnyChannels::sort(channels),
+                )
+            })
+            .collect();
+        let attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+        Image::from_layers(attributes, layers).write().to_file(path).unwrap();
+    }
+
+    #[test]
+    fn variance_is_read_and_a_missing_layer_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("r.exr");
+        let rgb: &[_] = &[("R", 1.0), ("G", 2.0), ("B", 3.0)];
+        let parts: Vec<_> = crate::image::FRACTIONS.iter().map(|n| (*n, 0.25)).collect();
+        let all = [("radiance", rgb), ("depth", &[("Z", 9.0)]), ("fractions", &parts), ("variance", rgb)];
+        write(&path, (5, 4), &all);
+        let layers = Layers::read(&path).unwrap();
+        assert_eq!((layers.size, layers.variance), ([5, 4], Some(vec![[1.0, 2.0, 3.0]; 20])));
+        for k in 0..3 {
+            let mut some = all.to_vec();
+            let (name, _) = some.remove(k);
+            write(&path, (5, 4), &some);
+            let error = Layers::read(&path).unwrap_err().to_string();
+            assert!(error.contains(name) && error.contains("no such layer"), "{error}");
+        }
+        std::fs::write(&path, b"no image").unwrap();
+        assert!(Layers::read(&path).unwrap_err().to_string().contains("not a linear image"));
+    }
+}

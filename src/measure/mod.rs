@@ -11,4 +11,5 @@ pub mod reflectance;
 pub mod report;
 pub mod results;
 pub mod statistics;
+pub mod sweep;
 pub mod trace;

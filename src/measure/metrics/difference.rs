@@ -18,6 +18,8 @@ pub struct Difference {
     pub reference_noise: Option<f64>,
     /// Error of radiance over the whole image, background included.
     pub image: Option<RadianceError>,
+    /// The same without the background, which is right at any setting and may be brighter than all else.
+    pub foreground: Option<RadianceError>,
     /// The same by region of the reference; regions that do not exist are left out.
     pub regions: BTreeMap<Region, RadianceError>,
     /// Mean FLIP of the pictures as displayed.
@@ -52,6 +54,7 @@ pub fn difference(actual: &Layers, reference: &Layers, exposure: f64) -> Result<
         not_finite: not_finite as u64,
         reference_noise: relative_noise(reference),
         image: radiance_error(actual, reference, |_| true),
+        foreground: radiance_error(actual, reference, |k| all[k] != Region::Background),
         regions: parts.into_iter().filter_map(of).collect(),
         flip: flip_error(actual, reference, exposure),
         ssim: structural(actual, reference, exposure),

@@ -49,9 +49,13 @@ pub fn radiance_error(
     })
 }
 
-/// Squared errors by block, over the square of the reference's mean radiance, noise subtracted: their mean is the square of
-/// [`RadianceError::rmse`] where blocks are alike in size. For comparing images block by block. `None` as there.
-pub fn squared_errors(actual: &Layers, reference: &Layers) -> Option<Vec<f64>> {
+/// Squared errors of the pixels that count by block, over the square of the reference's mean radiance there, noise subtracted,
+/// scaled so that their mean is the square of [`RadianceError::rmse`]. For comparing images block by block. `None` as there.
+pub fn squared_errors(
+    actual: &Layers,
+    reference: &Layers,
+    counts: impl Fn(usize) -> bool,
+) -> Option<Vec<f64>> {
     let blocks = block_sums(reference.size, |k| {
         let of = |c: usize| {
             let r = f64::from(reference.radiance[k][c]);
@@ -59,11 +63,11 @@ pub fn squared_errors(actual: &Layers, reference: &Layers) -> Option<Vec<f64>> {
             [d * d - f64::from(variance(reference, k)[c]), r]
         };
         let [a, b, c] = [of(0), of(1), of(2)];
-        Some([a[0] + b[0] + c[0], a[1] + b[1] + c[1]])
+        counts(k).then(|| [a[0] + b[0] + c[0], a[1] + b[1] + c[1], 3.0])
     });
-    let values = 3.0 * f64::from(reference.size[0] * reference.size[1]);
-    let mean = blocks.iter().map(|b| b[1]).sum::<f64>() / values;
-    let scale = blocks.len() as f64 / (values * mean * mean);
+    let total = |k: usize| blocks.iter().map(|b| b[k]).sum::<f64>();
+    let mean = total(1) / total(2);
+    let scale = blocks.len() as f64 / (total(2) * mean * mean);
     let errors: Vec<f64> = blocks.iter().map(|b| b[0] * scale).collect();
     (mean > 0.0 && errors.iter().all(|e| e.is_finite())).then_some(errors)
 }
@@ -134,14 +138,14 @@ mod tests {
         let e = radiance_error(&mapped(&one, |v| 1.5 * v), &one, |_| true).unwrap();
         assert!(close(e.bias.value, 0.5) && e.rmse.interval.is_none(), "{e:?}");
         assert_eq!(radiance_error(&texture([20, 20], 1), &black, |_| true), None);
-        assert_eq!(squared_errors(&texture([20, 20], 1), &black), None);
+        assert_eq!(squared_errors(&texture([20, 20], 1), &black, |_| true), None);
         assert_eq!(radiance_error(&black, &texture([20, 20], 1), |_| false), None);
         let any = texture([20, 20], 2);
         for value in [f32::NAN, f32::INFINITY] {
             let mut broken = any.clone();
             broken.radiance[7][1] = value;
             assert_eq!(radiance_error(&broken, &any, |_| true), None);
-            assert_eq!(squared_errors(&broken, &any), None);
+            assert_eq!(squared_errors(&broken, &any, |_| true), None);
             assert!(radiance_error(&broken, &any, |k| k != 7).is_some());
         }
     }
@@ -162,8 +166,8 @@ mod tests {
             prop_assert!(e.rmse.value.powi(2) + 2.0 * e.bias_standard_error.powi(2) + 1e-3 >= e.bias.value.powi(2));
             // 24 × 18 pixels: blocks of two sizes.
             let clean = Layers { variance: None, ..r };
-            let blocks = squared_errors(&a, &clean).unwrap();
-            let rmse = radiance_error(&a, &clean, |_| true).unwrap().rmse.value;
+            let blocks = squared_errors(&a, &clean, |k| k % 3 > 0).unwrap();
+            let rmse = radiance_error(&a, &clean, |k| k % 3 > 0).unwrap().rmse.value;
             prop_assert!(close(blocks.iter().sum::<f64>() / blocks.len() as f64, rmse * rmse));
         }
     }
