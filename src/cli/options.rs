@@ -1,6 +1,7 @@
 //! Options that several commands share.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use canopy::gpu::{Gpu, GpuOptions, Validation};
 use canopy::scene::{Camera, Scene};
@@ -136,6 +137,21 @@ pub fn shard(text: &str) -> std::result::Result<(usize, usize), String> {
     let (k, n) = text.split_once('/').ok_or_else(form)?;
     let (k, n) = (k.parse().map_err(|_| form())?, n.parse().map_err(|_| form())?);
     if (1..=n).contains(&k) { Ok((k, n)) } else { Err(form()) }
+}
+
+/// "50ms", "90s", "30m", "2h".
+pub fn time(text: &str) -> std::result::Result<Duration, String> {
+    let form = || "write a time, such as 50ms, 90s, 30m or 2h".to_string();
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit = match &text[digits.len()..] {
+        "ms" => 1e-3,
+        "s" => 1.0,
+        "m" => 60.0,
+        "h" => 3600.0,
+        _ => return Err(form()),
+    };
+    let number: f64 = digits.trim().parse().map_err(|_| form())?;
+    Duration::try_from_secs_f64(number * unit).map_err(|_| form())
 }
 
 /// Every knob, for `--help`.

@@ -9,7 +9,7 @@ use canopy::image::Layers;
 use canopy::measure::sweep::design::knobs;
 use canopy::measure::sweep::judge::judge;
 use canopy::measure::sweep::run::{PICTURES, Request, sweep};
-use canopy::measure::sweep::{SweepResult, report};
+use canopy::measure::sweep::{SweepResult, kept, report};
 use canopy::scene::Camera;
 use canopy::settings::{KNOBS, PRESETS};
 use canopy::{Error, Result};
@@ -52,7 +52,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(2..=10_000))]
     rounds: u32,
     /// Begin no setting after this, such as 90s, 30m or 2h; what is left is told
-    #[arg(long, value_name = "TIME", value_parser = time)]
+    #[arg(long, value_name = "TIME", value_parser = options::time)]
     budget: Option<Duration>,
     /// Part K of N of the settings, such as 2/8
     #[arg(long, value_name = "K/N", value_parser = options::shard)]
@@ -105,6 +105,9 @@ pub fn run(args: &Args) -> Result<()> {
         quiet: args.print.quiet,
     };
     let result = args.device.with(|gpu| sweep(gpu, &request, &args.output, &args.from))?;
+    if let Some(file) = cache::default_dir().and_then(|dir| kept::file(&dir, &result.identity).ok()) {
+        kept::keep(&file, &result)?;
+    }
     let write = |name: &str, text: &str| canopy::files::write_whole(&args.output.join(name), text.as_bytes());
     write("sweep.csv", &report::csv(&result))?;
     write("report.html", &report::html(&result, &args.output.join(PICTURES))?)?;
@@ -147,21 +150,6 @@ fn references(path: &std::path::Path, cameras: &[Camera], size: [u32; 2]) -> Res
         Ok((layers, canopy::files::digest(&bytes)))
     };
     cameras.iter().map(read).collect()
-}
-
-/// "50ms", "90s", "30m", "2h".
-pub fn time(text: &str) -> std::result::Result<Duration, String> {
-    let form = || "write a time, such as 50ms, 90s, 30m or 2h".to_string();
-    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
-    let unit = match &text[digits.len()..] {
-        "ms" => 1e-3,
-        "s" => 1.0,
-        "m" => 60.0,
-        "h" => 3600.0,
-        _ => return Err(form()),
-    };
-    let number: f64 = digits.trim().parse().map_err(|_| form())?;
-    Duration::try_from_secs_f64(number * unit).map_err(|_| form())
 }
 
 /// The values of every knob that is swept, for `--help`.

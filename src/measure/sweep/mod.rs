@@ -5,12 +5,13 @@
 //!   the error of its images against a reference (if there is one) and against the most accurate setting.
 //! * [`SweepResult`] holds what was measured, as it is written after every setting and read back to go on.
 //! * [`judge`] makes sense of it: which settings lie on the [`front`], what each knob does, and which setting fits a budget.
-//! * [`report`] writes it for people.
+//! * [`report`] writes it for people; [`kept`] finds it again.
 
 mod chart;
 pub mod design;
 pub mod front;
 pub mod judge;
+pub mod kept;
 pub mod report;
 mod result;
 pub mod run;

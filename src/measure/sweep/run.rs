@@ -230,11 +230,15 @@ impl Runner<'_> {
             let plan = bench::plan(&scene, &views, self.request.size, self.gpu)?;
             Subject::new(self.gpu, scene, plan, self.request.cache.as_deref(), self.request.quiet)
         };
-        let base = match kept {
+        let mut base = match kept {
             Some((_, subject)) => Some(subject),
             None if own_base => None,
             None => Some(build(&self.request.presets[&setting.base])?),
         };
+        if let Some(base) = &mut base {
+            // What was dropped is freed with the next frame, and not to be counted for this setting.
+            base.renderer.render(&views[0], auto_exposure(&self.request.scene))?;
+        }
         let bytes = || self.gpu.memory_report().iter().map(|(_, bytes)| bytes).sum::<u64>();
         let before = bytes();
         let own = build(&setting.settings)?;
