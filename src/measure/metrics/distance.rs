@@ -62,7 +62,7 @@ mod tests {
     /// Distances 10 m, 20 m, 40 m … in columns of ten pixels.
     fn far(radiance: impl Fn(usize) -> f32) -> Layers {
         let mut all = image([40, 40], |k| [radiance(k % 40 / 10); 3]);
-        all.depth = (0..1600).map(|k| 10.0 * 2f32.powi((k % 40 / 10) as i32)).collect();
+        all.depth = (0..1600).map(|k| 10.0 * 2f32.powi(k % 40 / 10)).collect();
         all
     }
 

@@ -107,11 +107,11 @@ mod tests {
         let e = radiance_error(&mapped(&any, |v| 0.9 * v), &any, |_| true).unwrap();
         assert!(close(e.bias.value, -0.1) && e.rmse.value > 0.1, "{e:?}");
         // Half of the pixels brighter, half darker: no bias.
-        let half = |k: usize| if k % 2 == 0 { 0.6 } else { 0.4 };
+        let half = |k: usize| if k.is_multiple_of(2) { 0.6 } else { 0.4 };
         let e = radiance_error(&image([64, 64], |k| [half(k); 3]), &flat, |_| true).unwrap();
         assert!(close(e.rmse.value, 0.2) && close(1.0 + e.bias.value, 1.0), "{e:?}");
         // Only what counts.
-        let e = radiance_error(&image([64, 64], |k| [half(k); 3]), &flat, |k| k % 2 == 0).unwrap();
+        let e = radiance_error(&image([64, 64], |k| [half(k); 3]), &flat, |k| k.is_multiple_of(2)).unwrap();
         assert!(close(e.bias.value, 0.2) && e.pixels == 2048, "{e:?}");
     }
 

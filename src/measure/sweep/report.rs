@@ -14,7 +14,7 @@ use crate::Result;
 use crate::measure::metrics::{Difference, Estimate};
 use crate::settings::{KNOBS, PRESETS};
 
-/// Columns of [`csv`].
+/// Columns of [`csv()`].
 pub const CSV_COLUMNS: [&str; 24] = [
     "setting",
     "base",
