@@ -46,7 +46,7 @@ pub struct Row {
     pub ms: f64,
     /// Root of the mean squared error of radiance over all cameras, relative to the mean radiance.
     pub error: Estimate,
-    /// Index, in the points, of one that is significantly better in both; `None` on the front.
+    /// Index, in the points, of one that dominates it; `None` on the front.
     pub dominated_by: Option<usize>,
     /// For fronts of some of the points.
     pub candidate: Candidate,
@@ -161,7 +161,7 @@ pub struct Tried {
     pub ratio: Estimate,
     /// Error.
     pub error: Estimate,
-    /// The value of this knob that is significantly better in both; `None` on the front.
+    /// The value of this knob that dominates it; `None` on the front.
     pub dominated_by: Option<f64>,
 }
 

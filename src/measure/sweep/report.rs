@@ -185,7 +185,8 @@ pub fn html(result: &SweepResult, pictures: &Path) -> Result<String> {
         "<p>{width} × {height}, {} cameras, {} on {} with {} threads, canopy {} ({}). Times are {}, each setting drawn in turn \
          with its preset; parentheses hold 95 % intervals. Errors are the root of the mean squared error of linear radiance \
          over everything but the background, relative to its mean, against the {}. A setting is on the front \
-         unless another is significantly better in both, by {:.0} % of the time and {:.0} % of the error at least.</p>\n",
+         unless another is significantly better in both, by {:.0} % of the time and {:.0} % of the error at least, or in \
+         one and surely no worse in the other by as much.</p>\n",
         result.identity.cameras.len(),
         escape(&result.identity.device.name),
         escape(&h.cpu),
