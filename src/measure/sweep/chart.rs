@@ -57,7 +57,7 @@ fn draw(
     lines: &[Vec<usize>],
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
     root.fill(&WHITE)?;
-    let x = range(marks.iter().flat_map(|m| ends(m.ratio).map(f64::ln)));
+    let x = range(marks.iter().flat_map(|m| ends(m.ratio).map(f64::log2)));
     let y = range(marks.iter().flat_map(|m| ends(m.error).map(|e| 100.0 * e)));
     let mut chart = ChartBuilder::on(root)
         .caption(title, ("sans-serif", 16))
@@ -69,20 +69,20 @@ fn draw(
         .configure_mesh()
         .x_desc("time over balanced")
         .y_desc("error, %")
-        .x_label_formatter(&|x| format!("{:.2}", x.exp()))
+        .x_label_formatter(&|x| format!("{:.2}", x.exp2()))
         .y_label_formatter(&|y| format!("{y:.1}"))
         .x_labels(6)
         .y_labels(6)
         .light_line_style(TRANSPARENT)
         .draw()?;
-    let at = |m: &Mark| (m.ratio.value.ln(), 100.0 * m.error.value);
+    let at = |m: &Mark| (m.ratio.value.log2(), 100.0 * m.error.value);
     for line in lines {
         let points = line.iter().map(|k| at(&marks[*k]));
         chart.draw_series(LineSeries::new(points, RGBColor(120, 120, 120).stroke_width(1)))?;
     }
     for m in marks {
         let (x, y) = at(m);
-        let bars = [ends(m.ratio).map(|e| (e.ln(), y)), ends(m.error).map(|e| (x, 100.0 * e))];
+        let bars = [ends(m.ratio).map(|e| (e.log2(), y)), ends(m.error).map(|e| (x, 100.0 * e))];
         let pale = RGBColor(190, 190, 190).stroke_width(1);
         chart.draw_series(bars.map(|[a, b]| PathElement::new(vec![a, b], pale)))?;
     }
