@@ -91,6 +91,11 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     file.write_all(bytes).and_then(|()| file.finish()).map_err(|e| Error::io(path, e))
 }
 
+/// BLAKE3 of bytes, in hexadecimal.
+pub fn digest(bytes: &[u8]) -> String {
+    blake3::hash(bytes).to_hex().to_string()
+}
+
 /// Whether [`write_whole`] could write there now: for finding out before a long run. Leaves nothing behind.
 ///
 /// # Errors

@@ -1,5 +1,7 @@
 //! Images out: PNG for eyes, linear EXR with named layers for measurements. Written aside, then renamed.
 
+mod layers;
+
 use std::path::Path;
 
 use exr::prelude::{
@@ -13,6 +15,10 @@ use crate::frame::targets::ImageTargets;
 use crate::gpu::Gpu;
 use crate::plan::Plan;
 use crate::{Error, Result};
+pub use layers::Layers;
+
+/// Channels of the layer `fractions`, in the order of [`Linear::fractions`].
+const FRACTIONS: [&str; 4] = ["lit_ground", "shadowed_ground", "lit_tree", "shadowed_tree"];
 
 /// One frame, on the host.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +58,13 @@ pub struct Noise {
     pub variance: Vec<[f32; 3]>,
     /// Samples.
     pub samples: Vec<u32>,
+}
+
+impl Linear {
+    /// Radiance, RGB: the sum of both parts.
+    pub fn radiance(&self) -> Vec<[f32; 3]> {
+        self.sun.iter().zip(&self.sky).map(|(a, b)| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]).collect()
+    }
 }
 
 impl Picture {
@@ -108,8 +121,7 @@ impl Picture {
     /// # Errors
     /// [`Error::Io`].
     pub fn write_png(&self, path: &Path) -> Result<()> {
-        let bytes = png(&self.rgb(), self.size).map_err(|e| Error::io(path, std::io::Error::other(e)))?;
-        write_whole(path, &bytes)
+        write_png(path, &self.rgb(), self.size)
     }
 
     /// Writes the linear image as EXR: layers `radiance`, `sun`, `sky` (R, G, B), `depth` (Z), `trees` (coverage),
@@ -123,8 +135,6 @@ impl Picture {
             return Err(Error::Usage("an EXR needs a plan with layers".into()));
         };
         let size = (self.size[0] as usize, self.size[1] as usize);
-        let radiance: Vec<[f32; 3]> =
-            l.sun.iter().zip(&l.sky).map(|(a, b)| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]).collect();
         let layer = |name: &str, channels: Vec<(&str, FlatSamples)>| {
             let channels: Vec<_> =
                 channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples)).collect();
@@ -140,7 +150,7 @@ impl Picture {
             layer(name, vec![("R", channel(0)), ("G", channel(1)), ("B", channel(2))])
         };
         let mut layers = vec![
-            rgb("radiance", &radiance),
+            rgb("radiance", &l.radiance()),
             rgb("sun", &l.sun),
             rgb("sky", &l.sky),
             layer("depth", vec![("Z", FlatSamples::F32(l.depth.clone()))]),
@@ -148,7 +158,7 @@ impl Picture {
             layer("species", vec![("id", FlatSamples::U32(l.species.clone()))]),
             layer(
                 "fractions",
-                ["lit_ground", "shadowed_ground", "lit_tree", "shadowed_tree"]
+                FRACTIONS
                     .iter()
                     .enumerate()
                     .map(|(k, name)| (*name, FlatSamples::F32(l.fractions.iter().map(|f| f[k]).collect())))
@@ -171,6 +181,15 @@ impl Picture {
             .map_err(|e| Error::io(path, std::io::Error::other(e)))?;
         write_whole(path, bytes.get_ref())
     }
+}
+
+/// Writes an 8-bit RGB image as PNG.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_png(path: &Path, rgb: &[u8], size: [u32; 2]) -> Result<()> {
+    let bytes = png(rgb, size).map_err(|e| Error::io(path, std::io::Error::other(e)))?;
+    write_whole(path, &bytes)
 }
 
 /// An RGB image as PNG.

@@ -54,6 +54,8 @@
 //! | timestamps, statistics of the pipeline, CPU time a pass | [`gpu::Timing`], [`clock`] | | `tests/bench.rs`, `tests/proofs/bench.rs` |
 //! | benches along camera paths | [`measure::bench`], [`measure::path`], [`measure::results`], [`measure::trace`] | | `tests/bench.rs` |
 //! | what differs between two benches | [`measure::compare`], [`measure::statistics`] | | `tests/compare.rs`, `tests/proofs/bench.rs` |
+//! | how far images are from a reference | [`measure::metrics`], [`image::Layers`] | | unit tests, `tests/sweep.rs` |
+//! | time against accuracy of every knob | [`measure::sweep`] | | `tests/sweep.rs` |
 //! | files whole or not at all | [`files`] | | `tests/robustness.rs` |
 //! | what reads files, fuzzed | [`scene`], [`bake`] | | `tests/fuzz/` |
 //! | memory that runs out, a lost device | [`gpu`] | | `tests/gpu/failures.rs`, `tests/robustness.rs` |

@@ -17,23 +17,38 @@ pub struct Knob {
     pub whole: bool,
     /// Values at presets fast, balanced, accurate.
     pub presets: [f64; 3],
+    /// Values that a sweep tries, towards the last, which is the most accurate within reason; empty for knobs that are no choice
+    /// between time and accuracy.
+    pub tries: &'static [f64],
+    /// Another value needs another bake: minutes, once.
+    pub bakes: bool,
     /// Meaning and cost.
     pub help: &'static str,
+}
+
+impl Knob {
+    /// The values to try just below and just above one, where there are such.
+    pub fn around(&self, value: f64) -> Vec<f64> {
+        let below = self.tries.iter().copied().filter(|t| *t < value).reduce(f64::max);
+        let above = self.tries.iter().copied().filter(|t| *t > value).reduce(f64::min);
+        below.into_iter().chain(above).collect()
+    }
 }
 
 /// Names of the presets, in the order of [`Knob::presets`].
 pub const PRESETS: [&str; 3] = ["fast", "balanced", "accurate"];
 
 macro_rules! knobs {
-    ($($field:ident: $ty:tt, $unit:literal, $min:literal..=$max:literal, [$f:literal, $b:literal, $a:literal], $help:literal;)*) => {
+    ($($field:ident: $ty:tt, $unit:literal, $min:literal..=$max:literal, [$f:literal, $b:literal, $a:literal], $cost:ident [$($try:literal),*], $help:literal;)*) => {
         /// The value of every knob.
-        #[derive(Clone, Debug, PartialEq, serde::Serialize)]
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
         pub struct Settings { $(#[doc = $help] pub $field: $ty,)* }
 
         /// Every knob, in the order of printing.
         pub const KNOBS: &[Knob] = &[$(Knob {
             name: stringify!($field), unit: $unit, min: $min as f64, max: $max as f64,
-            whole: knobs!(@whole $ty), presets: [$f as f64, $b as f64, $a as f64], help: $help,
+            whole: knobs!(@whole $ty), presets: [$f as f64, $b as f64, $a as f64],
+            tries: &[$($try as f64),*], bakes: knobs!(@bakes $cost), help: $help,
         },)*];
 
         impl Settings {
@@ -54,33 +69,35 @@ macro_rules! knobs {
     };
     (@whole u32) => { true };
     (@whole f32) => { false };
+    (@bakes bake) => { true };
+    (@bakes draw) => { false };
 }
 
 knobs! {
-    view_rings: u32, "", 1..=16, [6, 9, 9], "rings n of z-field views: 2n(n+1)+1 views over the hemisphere (9: 181); memory and bake time grow with the square";
-    view_resolution: u32, "texels", 16..=512, [128, 256, 256], "texels a side of a z-field view (a power of two); memory and bake time grow with the square";
-    view_iterations: u32, "", 1..=4, [1, 2, 3], "fixed-point iterations for the view ray; each costs three texel fetches a fragment";
-    light_iterations: u32, "", 0..=2, [1, 1, 2], "iterations for the light ray; 0 leaves out self-shadow and silver lining";
-    occlusion_rays: u32, "", 8..=1024, [32, 64, 128], "rays a cell for baked ambient occlusion; bake time";
-    samples: u32, "", 1..=8, [4, 4, 8], "samples a pixel (1, 4 or 8, as far as the device goes): levels of opacity; fill cost";
-    zfield_min_pixels: f32, "px", 0.25..=64.0, [4.0, 3.0, 2.0], "apparent tree height under which trees are no longer drawn one by one; cost grows with its inverse square";
-    convergence: f32, "", 0.1..=0.8, [0.4, 0.45, 0.6], "part of the tree-by-tree range at which light and shadow have become the averages of the tables (BN12, eq. 22-25: 0.8); cost of shadows grows with the square";
-    silhouette_min_pixels: f32, "px", 0.25..=64.0, [1.0, 1.0, 1.0], "apparent height under which trees on the silhouettes of ridges are no longer drawn either; from zfield_min_pixels on they are as others";
-    zfield_max_trees: u32, "", 1..=16000000, [1000000, 2000000, 4000000], "most trees drawn one by one; bounds memory";
-    cascades: u32, "", 1..=4, [3, 4, 4], "shadow cascades; each draws the trees of its slice again";
-    cascade_size: u32, "texels", 64..=8192, [512, 1024, 2048], "texels a side of a cascade; fill cost";
-    cascade_split: f32, "", 0.0..=1.0, [0.8, 0.8, 0.8], "0 uniform, 1 logarithmic cascade ranges (parallel-split)";
-    shadow_distance: f32, "m", 0.0..=1000000.0, [0.0, 0.0, 0.0], "range of the cascades; 0 is as far as light has not converged";
-    coverage_size: u32, "texels", 32..=1024, [128, 256, 512], "texels a side of the coverage tile of a terrain quad; memory and the time to make one grow with the square";
-    terrain_pixels: f32, "px", 1.0..=64.0, [12.0, 8.0, 4.0], "size of a terrain mesh cell on the screen; vertices grow with the inverse square";
-    hotspot_amplitude: f32, "", 0.0..=1.0, [0.0, 0.0, 0.0], "a1 of a hotspot (BN12, eq. 8: 0.2) on top of the one that is measured from each mesh";
-    hotspot_width: f32, "1/rad", 0.0..=1000.0, [20.0, 20.0, 20.0], "a2 of that hotspot (BN12, eq. 8)";
-    ground_contrast: f32, "", 0.0..=4.0, [1.0, 1.0, 1.0], "a3: how much darker the ground is under trees than between them (BN12, eq. 10)";
-    hole_radius: f32, "", 0.1..=10.0, [2.0, 2.0, 2.0], "radius of the hole around a tree times the square root of the density (BN12, eq. 9: 2; Poisson points: 0.5)";
-    table_angles: u32, "", 4..=32, [16, 16, 16], "nodes of each angle in the tables of far trees; memory grows with the cube";
-    table_densities: u32, "", 2..=16, [8, 8, 8], "nodes of the density in the tables of far trees; memory";
-    table_rays: u32, "", 32..=1048576, [1024, 2048, 8192], "points on crowns that light in the tables of far trees is measured at, four to a ground point; error falls with the root, time grows in proportion";
-    memory_mib: u32, "MiB", 16..=1048576, [2048, 2048, 4096], "most device memory a plan may take";
+    view_rings: u32, "", 1..=16, [6, 9, 9], bake [4, 6, 9, 12], "rings n of z-field views: 2n(n+1)+1 views over the hemisphere (9: 181); memory and bake time grow with the square";
+    view_resolution: u32, "texels", 16..=512, [128, 256, 256], bake [64, 128, 256, 512], "texels a side of a z-field view (a power of two); memory and bake time grow with the square";
+    view_iterations: u32, "", 1..=4, [1, 2, 3], bake [1, 2, 3, 4], "fixed-point iterations for the view ray; each costs three texel fetches a fragment";
+    light_iterations: u32, "", 0..=2, [1, 1, 1], bake [0, 2, 1], "iterations for the light ray; 0 leaves out what grows with its length; self-shadow is measured for 1";
+    occlusion_rays: u32, "", 8..=1024, [32, 64, 128], bake [16, 32, 64, 128, 256], "rays a cell for baked ambient occlusion; bake time";
+    samples: u32, "", 1..=8, [4, 4, 8], draw [1, 4, 8], "samples a pixel (1, 4 or 8, as far as the device goes): levels of opacity; fill cost";
+    zfield_min_pixels: f32, "px", 0.25..=64.0, [4.0, 3.0, 2.0], draw [8.0, 6.0, 4.0, 3.0, 2.0, 1.5], "apparent tree height under which trees are no longer drawn one by one; cost grows with its inverse square";
+    convergence: f32, "", 0.1..=0.8, [0.4, 0.45, 0.6], draw [0.3, 0.4, 0.45, 0.6, 0.8], "part of the tree-by-tree range at which light and shadow have become the averages of the tables (BN12, eq. 22-25: 0.8); cost of shadows grows with the square";
+    silhouette_min_pixels: f32, "px", 0.25..=64.0, [1.0, 1.0, 1.0], draw [2.0, 1.0, 0.5], "apparent height under which trees on the silhouettes of ridges are no longer drawn either; from zfield_min_pixels on they are as others";
+    zfield_max_trees: u32, "", 1..=16000000, [1000000, 2000000, 4000000], draw [], "most trees drawn one by one; bounds memory";
+    cascades: u32, "", 1..=4, [3, 4, 4], draw [1, 2, 3, 4], "shadow cascades; each draws the trees of its slice again";
+    cascade_size: u32, "texels", 64..=8192, [512, 1024, 2048], draw [256, 512, 1024, 2048, 4096], "texels a side of a cascade; fill cost";
+    cascade_split: f32, "", 0.0..=1.0, [0.8, 0.8, 0.8], draw [0.5, 0.95, 0.8], "0 uniform, 1 logarithmic cascade ranges (parallel-split)";
+    shadow_distance: f32, "m", 0.0..=1000000.0, [0.0, 0.0, 0.0], draw [], "range of the cascades; 0 is as far as light has not converged";
+    coverage_size: u32, "texels", 32..=1024, [128, 256, 512], draw [64, 128, 256, 512], "texels a side of the coverage tile of a terrain quad; memory and the time to make one grow with the square";
+    terrain_pixels: f32, "px", 1.0..=64.0, [12.0, 8.0, 4.0], draw [20.0, 12.0, 8.0, 4.0, 2.0], "size of a terrain mesh cell on the screen; vertices grow with the inverse square";
+    hotspot_amplitude: f32, "", 0.0..=1.0, [0.0, 0.0, 0.0], draw [], "a1 of a hotspot (BN12, eq. 8: 0.2) on top of the one that is measured from each mesh";
+    hotspot_width: f32, "1/rad", 0.0..=1000.0, [20.0, 20.0, 20.0], draw [], "a2 of that hotspot (BN12, eq. 8)";
+    ground_contrast: f32, "", 0.0..=4.0, [1.0, 1.0, 1.0], draw [], "a3: how much darker the ground is under trees than between them (BN12, eq. 10)";
+    hole_radius: f32, "", 0.1..=10.0, [2.0, 2.0, 2.0], draw [], "radius of the hole around a tree times the square root of the density (BN12, eq. 9: 2; Poisson points: 0.5)";
+    table_angles: u32, "", 4..=32, [16, 16, 16], bake [8, 16, 24], "nodes of each angle in the tables of far trees; memory grows with the cube";
+    table_densities: u32, "", 2..=16, [8, 8, 8], bake [4, 8, 16], "nodes of the density in the tables of far trees; memory";
+    table_rays: u32, "", 32..=1048576, [1024, 2048, 8192], bake [512, 1024, 2048, 8192, 32768], "points on crowns that light in the tables of far trees is measured at, four to a ground point; error falls with the root, time grows in proportion";
+    memory_mib: u32, "MiB", 16..=1048576, [2048, 2048, 4096], draw [], "most device memory a plan may take";
 }
 
 impl Default for Settings {
@@ -146,6 +163,18 @@ mod tests {
                 assert_eq!(s.get(k.name), Some(k.presets[i] as f32 as f64).filter(|_| true), "{}", k.name);
             }
         }
+    }
+
+    #[test]
+    fn values_to_try_are_allowed_and_lie_on_both_sides() {
+        for k in KNOBS {
+            let mut s = Settings::default();
+            k.tries.iter().for_each(|t| s.set(k.name, *t).unwrap());
+            assert!(k.tries.is_empty() || k.presets.iter().all(|p| !k.around(*p).is_empty()), "{}", k.name);
+        }
+        let pixels = KNOBS.iter().find(|k| k.name == "zfield_min_pixels").unwrap();
+        assert_eq!((pixels.around(3.0), pixels.around(1.5)), (vec![2.0, 4.0], vec![2.0]));
+        assert_eq!(pixels.around(5.0), [4.0, 6.0]);
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! `canopy bench` as a script sees it: names that stay, times that add up, one clock, and what is refused.
 
-use std::collections::BTreeSet;
+#[path = "common/keys.rs"]
+mod keys;
+
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -50,39 +52,14 @@ fn json(folder: &Path, args: &[&str]) -> Value {
     serde_json::from_slice(&out.stdout).unwrap()
 }
 
-/// Every key by its path; lists count as one `[]`, and tables whose keys are names of things as one `*`.
-fn keys(value: &Value, path: &str, found: &mut BTreeSet<String>) {
-    let named = ["settings", "assets", "bake_cache", "heaps", "allocations", "variables", "metrics"];
-    match value {
-        // A table that happens to be empty here is one all the same.
-        Value::Object(all) if all.is_empty() => {
-            found.insert(format!("{}.*", path.trim_start_matches('.')));
-        }
-        Value::Object(all) => {
-            for (k, v) in all {
-                let k = if named.iter().any(|n| path.ends_with(n)) { "*" } else { k };
-                keys(v, &format!("{path}.{k}"), found);
-            }
-        }
-        Value::Array(all) if all.iter().any(|v| v.is_object()) => {
-            all.iter().for_each(|v| keys(v, &format!("{path}[]"), found));
-        }
-        _ => {
-            found.insert(path.trim_start_matches('.').to_string());
-        }
-    }
-}
-
 #[test]
 fn names_of_the_json_and_csv_stay() {
     let dir = tempfile::tempdir().unwrap();
     let files = ["--csv", "b.csv", "--bmf", "m.json", "-o", "o.json", "--pipeline-statistics"];
     let result = json(dir.path(), &[&["--frames", "3", "--step", "4"], &files[..]].concat());
-    let mut found = BTreeSet::new();
-    keys(&result, "", &mut found);
-    let found: Vec<String> = found.into_iter().collect();
-    let expected: Vec<&str> = include_str!("data/bench_keys.txt").lines().collect();
-    assert_eq!(found, expected, "\n{}", found.join("\n"));
+    let named = ["settings", "assets", "bake_cache", "heaps", "allocations", "variables", "metrics"];
+    let found = keys::keys(&result, &named);
+    assert!(found == include_str!("data/bench_keys.txt"), "{found}");
     let read = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
     assert_eq!(serde_json::from_str::<Value>(&read("o.json")).unwrap(), result);
 

@@ -22,6 +22,17 @@ pub enum CacheState {
     Rebuilt,
 }
 
+impl CacheState {
+    /// In a word, for reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            CacheState::Hit => "hit",
+            CacheState::Baked => "baked",
+            CacheState::Rebuilt => "rebuilt",
+        }
+    }
+}
+
 /// The user's cache directory: `$CANOPY_CACHE`, else `$XDG_CACHE_HOME/canopy`, else `~/.cache/canopy`; `None`
 /// if none of these variables is set.
 pub fn default_dir() -> Option<PathBuf> {

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use canopy::Result;
 use canopy::bake::tables::{self, ForestSettings};
-use canopy::bake::{self, BakeSettings, CacheState, SpeciesBake, cache, load_or_bake};
+use canopy::bake::{self, BakeSettings, SpeciesBake, cache, load_or_bake};
 use canopy::scene::{Mesh, OpticsOverride};
 use canopy::settings::Settings;
 
@@ -107,15 +107,6 @@ struct Report {
     species: Vec<Baked>,
 }
 
-/// A cache state in words, here and in the report of a render.
-pub fn state(state: CacheState) -> &'static str {
-    match state {
-        CacheState::Hit => "hit",
-        CacheState::Baked => "baked",
-        CacheState::Rebuilt => "rebuilt",
-    }
-}
-
 pub fn run(args: &Args) -> Result<()> {
     let mut species = Vec::new();
     if args.model.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
@@ -167,7 +158,7 @@ fn one(
         views: canopy::physics::views::count(wanted.rings),
         resolution: wanted.resolution,
         bytes: bake.views.levels.iter().map(Vec::len).sum(),
-        cache: state(from),
+        cache: from.name(),
         path: path.map(|p| p.display().to_string()),
         seconds,
         optics: Optics {
@@ -207,7 +198,7 @@ fn forest(
     Ok(Forest {
         trees_per_m2: density,
         max_thickness: t.max_thickness,
-        cache: state(from),
+        cache: from.name(),
         path: path.map(|p| p.display().to_string()),
         seconds,
         ground_error: t.pair_stderr.iter().map(|e| e[0]).fold(0.0, f32::max),

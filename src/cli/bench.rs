@@ -1,18 +1,15 @@
 //! `canopy bench`.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
-use canopy::bake::{Baked, cache, load_or_bake_scene};
-use canopy::frame::Renderer;
+use canopy::bake::cache;
 use canopy::gpu::{Gpu, TimingOptions};
 use canopy::measure::bench::{Request, Subject, plan, run as measure};
 use canopy::measure::compare::{Comparison, compare};
 use canopy::measure::path::CameraPath;
 use canopy::measure::report::markdown;
-use canopy::measure::results::{BenchResult, Cold};
+use canopy::measure::results::BenchResult;
 use canopy::measure::trace::trace;
 use canopy::scene::Scene;
 use canopy::settings::Settings;
@@ -156,29 +153,16 @@ fn bench(
         pace: software,
         validate: args.device.validate,
     };
-    let subject = |settings| build(args, gpu, Scene { settings, ..scene.clone() }, &request, load_s);
+    let views = request.path.views(request.step)?;
+    let subject = |settings| {
+        let scene = Scene { settings, ..scene.clone() };
+        let plan = plan(&scene, &views, args.scene.size, gpu)?;
+        let mut subject = Subject::new(gpu, scene, plan, cache::default_dir().as_deref(), args.print.quiet)?;
+        subject.cold.load_s = load_s;
+        Ok(subject)
+    };
     let mut subjects = settings.into_iter().map(subject).collect::<Result<Vec<_>>>()?;
     measure(gpu, &mut subjects, &request, args.print.quiet)
-}
-
-/// Bakes and builds one setting.
-fn build(args: &Args, gpu: &Gpu, scene: Scene, request: &Request, load_s: f64) -> Result<Subject> {
-    let views = request.path.views(request.step)?;
-    let plan = plan(&scene, &views, args.scene.size, gpu)?;
-    let start = Instant::now();
-    let found = load_or_bake_scene(&scene, cache::default_dir().as_deref(), args.print.quiet)?;
-    let bake_s = start.elapsed().as_secs_f64();
-    let bake_cache: BTreeMap<String, String> = scene
-        .species
-        .iter()
-        .zip(&found)
-        .map(|(s, (_, from))| (s.name.clone(), super::bake::state(from.species).to_string()))
-        .collect();
-    let baked: Vec<Baked> = found.into_iter().map(|(baked, _)| baked).collect();
-    let start = Instant::now();
-    let renderer = Renderer::new(gpu, Arc::new(scene), plan, &baked)?;
-    let build_s = start.elapsed().as_secs_f64();
-    Ok(Subject { renderer, cold: Cold { load_s, bake_s, bake_cache, build_s, ..Cold::default() } })
 }
 
 /// Writes and prints.

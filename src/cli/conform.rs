@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(long)]
     list: bool,
     /// Run part k of n
-    #[arg(long, value_name = "K/N", default_value = "1/1", value_parser = shard)]
+    #[arg(long, value_name = "K/N", default_value = "1/1", value_parser = super::options::shard)]
     shard: (usize, usize),
     /// Folder of the references and of expectations.txt
     #[arg(long, value_name = "FOLDER", default_value = conform::default_references().as_os_str())]
@@ -146,11 +146,4 @@ fn print(args: &Args, driver: &str, outcomes: &[Outcome]) -> Result<()> {
         text += &format!("\n{}: {}: {}\n", o.verdict.name(), o.name, o.reason);
     }
     output::print(&text)
-}
-
-fn shard(text: &str) -> std::result::Result<(usize, usize), String> {
-    let form = || "write K/N, such as 2/8: part K of N, from 1".to_string();
-    let (k, n) = text.split_once('/').ok_or_else(form)?;
-    let (k, n) = (k.parse().map_err(|_| form())?, n.parse().map_err(|_| form())?);
-    if (1..=n).contains(&k) { Ok((k, n)) } else { Err(form()) }
 }

@@ -5,12 +5,14 @@ mod bench;
 mod compare;
 mod conform;
 mod devices;
+mod difference;
 mod options;
 mod output;
 mod plan;
 mod reference;
 mod reflectance;
 mod render;
+mod sweep;
 mod tree;
 
 use std::io::Write;
@@ -46,6 +48,10 @@ enum Command {
     Bench(bench::Args),
     /// Compare two bench results: significance, not only a ratio; a gate with --fail-above.
     Compare(compare::Args),
+    /// The trade of time for accuracy: every knob around every preset, Pareto front, report.
+    Sweep(sweep::Args),
+    /// Every metric of one linear image against another: error, bias, FLIP, structural similarity, ratio over distance.
+    Difference(difference::Args),
     /// Radiance of a patch of the scene's forest against view angle, sun angle and distance, as CSV.
     Reflectance(reflectance::Args),
     /// Precompute a tree model ahead of time (otherwise done on first use), and measure how good it is.
@@ -66,6 +72,8 @@ pub fn run() -> ExitCode {
         Command::Render(args) => render::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Sweep(args) => sweep::run(&args),
+        Command::Difference(args) => difference::run(&args),
         Command::Reflectance(args) => reflectance::run(&args),
         Command::Bake(args) => bake::run(&args),
         Command::Tree(args) => tree::run(&args),

@@ -226,7 +226,8 @@ pub struct PrintOptions {
     pub json: bool,
 }
 
-fn size(text: &str) -> std::result::Result<[u32; 2], String> {
+/// `WIDTHxHEIGHT`.
+pub fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     let form = || "write WIDTHxHEIGHT in pixels, such as 1024x768".to_string();
     let (width, height) = text.split_once(['x', 'X', '×']).ok_or_else(form)?;
     let side = |s: &str| -> std::result::Result<u32, String> {
@@ -241,6 +242,29 @@ pub fn assignment(text: &str) -> std::result::Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("write KNOB=VALUE, such as samples=8")?;
     let number = value.trim().parse().map_err(|_| format!("\"{value}\" is no number"))?;
     Ok((name.trim().to_string(), number))
+}
+
+/// `K/N`, part K of N, from 1.
+pub fn shard(text: &str) -> std::result::Result<(usize, usize), String> {
+    let form = || "write K/N, such as 2/8: part K of N, from 1".to_string();
+    let (k, n) = text.split_once('/').ok_or_else(form)?;
+    let (k, n) = (k.parse().map_err(|_| form())?, n.parse().map_err(|_| form())?);
+    if (1..=n).contains(&k) { Ok((k, n)) } else { Err(form()) }
+}
+
+/// "50ms", "90s", "30m", "2h".
+pub fn time(text: &str) -> std::result::Result<Duration, String> {
+    let form = || "write a time, such as 50ms, 90s, 30m or 2h".to_string();
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit = match &text[digits.len()..] {
+        "ms" => 1e-3,
+        "s" => 1.0,
+        "m" => 60.0,
+        "h" => 3600.0,
+        _ => return Err(form()),
+    };
+    let number: f64 = digits.trim().parse().map_err(|_| form())?;
+    Duration::try_from_secs_f64(number * unit).map_err(|_| form())
 }
 
 /// Every knob, for `--help`.

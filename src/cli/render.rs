@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use canopy::bake::{Baked, cache, load_or_bake_scene};
 use canopy::frame::camera::Eye;
 use canopy::frame::{FrameReport, Renderer, auto_exposure};
 use canopy::gpu::{DeviceInfo, FrameCapture, Gpu, PassTime};
+use canopy::measure::results::SceneIdentity;
+use canopy::measure::sweep::kept::{self, Choice, Subject};
 use canopy::plan::{Plan, Representation, ViewMode};
 use canopy::progress::Progress;
 use canopy::scene::{Camera, Scene};
@@ -15,7 +17,9 @@ use canopy::settings::Settings;
 use canopy::{Error, Result};
 
 use super::SCHEMA_VERSION;
-use super::options::{DeviceOptions, Drawn, PrintOptions, ReferenceOptions, SceneOptions, knobs_help, named};
+use super::options::{
+    self, DeviceOptions, Drawn, PrintOptions, ReferenceOptions, SceneOptions, knobs_help, named,
+};
 use super::output::{self, Table};
 use super::reference;
 
@@ -27,6 +31,7 @@ Examples:
   canopy render --size 320x240 --quality fast         small and quick
   canopy render --set samples=8 --set cascades=2      turn knobs; --help lists them all
   canopy render --view-mode fractions -o k.png        lit and shadowed ground and trees
+  canopy render --budget 50ms                         the most accurate setting that `canopy sweep` found to hold 50 ms
   canopy render --frames 5 --json > report.json       warm timings for a script
   canopy render --representation reference --camera near --size 512x384 --until 5% --resume near.sums -o truth.png
                                                       path tracing of the real trees on the CPU; run it again to go on
@@ -50,6 +55,12 @@ pub struct Args {
     /// lod, cascades, normals
     #[arg(long, value_name = "MODE", default_value = "radiance", value_parser = named(ViewMode::NAMES))]
     view_mode: ViewMode,
+    /// Draw at the most accurate setting that a sweep found to hold this time, such as 50ms, instead of --quality and --set
+    #[arg(long, value_name = "TIME", value_parser = options::time, conflicts_with_all = ["preset", "set"])]
+    budget: Option<Duration>,
+    /// Sweep that --budget takes the setting from; left out: the last one of this scene, size and device
+    #[arg(long, value_name = "FILE.json", requires = "budget")]
+    sweep: Option<PathBuf>,
     /// How trees are drawn: auto, zfield or shader-map at any distance, or reference: path tracing on the CPU
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = named(Drawn::names()))]
     representation: Drawn,
@@ -145,6 +156,9 @@ struct Report<'a> {
     command: &'static str,
     scene: SceneReport<'a>,
     settings: &'a Settings,
+    /// Left out without `--budget`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    budget: Option<Choice>,
     device: &'a DeviceInfo,
     plan: &'a Plan,
     bakes: Vec<Bake<'a>>,
@@ -245,7 +259,7 @@ fn stops(text: &str) -> std::result::Result<f64, String> {
 fn draw(
     args: &Args,
     gpu: &Gpu,
-    scene: Scene,
+    mut scene: Scene,
     camera: &Camera,
     representation: Representation,
     png: PathBuf,
@@ -253,6 +267,10 @@ fn draw(
     mut capture: Option<FrameCapture>,
 ) -> Result<()> {
     let quiet = args.print.quiet;
+    let budget = args.budget.map(|t| choose(args, gpu, &scene, t)).transpose()?;
+    if let Some(choice) = &budget {
+        scene.settings = choice.settings.clone();
+    }
     let eye = Eye::new(camera, &scene.terrain, args.scene.size);
     let mut plan = Plan::for_eye(&scene, &eye, args.exr.is_some(), representation, Some(gpu.info()))?;
     plan.view_mode = args.view_mode;
@@ -262,7 +280,7 @@ fn draw(
     let found = load_or_bake_scene(&scene, cache::default_dir().as_deref(), quiet)?;
     for (s, (bake, from)) in scene.species.iter().zip(found) {
         baked.push(bake);
-        let (cache, tables) = (super::bake::state(from.species), super::bake::state(from.tables));
+        let (cache, tables) = (from.species.name(), from.tables.name());
         states.push(Bake { species: &s.name, cache, tables });
     }
     let bake_s = start.elapsed().as_secs_f64();
@@ -310,6 +328,7 @@ fn draw(
             exposure,
         },
         settings: &scene.settings,
+        budget,
         device: gpu.info(),
         plan,
         bakes: states,
@@ -340,6 +359,29 @@ fn draw(
     }
 }
 
+/// The setting that holds a time.
+fn choose(args: &Args, gpu: &Gpu, scene: &Scene, time: Duration) -> Result<Choice> {
+    let subject =
+        Subject { scene: SceneIdentity::new(scene), size: args.scene.size, device: gpu.info().into() };
+    let file = match &args.sweep {
+        Some(file) => file.clone(),
+        None => {
+            let cache =
+                cache::default_dir().ok_or_else(|| Error::Usage("no cache; name a --sweep".into()))?;
+            let [w, h] = subject.size;
+            Some(kept::file(&cache, subject.clone())?).filter(|f| f.exists()).ok_or_else(|| {
+                Error::Usage(format!(
+                    "--budget: no sweep of this scene at {w}x{h} on {} is known\n  remedy: canopy sweep {}--size {w}x{h} \
+                     -o DIR, or name one with --sweep FILE.json",
+                    subject.device.name,
+                    args.scene.scene.as_ref().map_or(String::new(), |s| format!("{} ", s.display()))
+                ))
+            })?
+        }
+    };
+    kept::choose(&file, &subject, 1e3 * time.as_secs_f64())
+}
+
 fn trees(frame: &FrameReport) -> Trees<'_> {
     Trees {
         in_view: frame.trees.camera,
@@ -353,6 +395,22 @@ fn text(r: &Report) -> String {
         "{}, camera {}, {} x {} on {}\n\n",
         r.scene.name, r.scene.camera, r.scene.size[0], r.scene.size[1], r.device.name
     );
+    if let Some(c) = &r.budget {
+        let differs = match &c.differs[..] {
+            [] => String::new(),
+            all => format!("; another {} than here", all.join(" and another ")),
+        };
+        text += &format!(
+            "{} holds {} ms: frames took {:.1} ms, with an error of {:.2} %, on {} with {}{differs} ({})\n\n",
+            c.setting,
+            c.budget_ms,
+            c.wall_ms.value,
+            100.0 * c.error.value,
+            c.device,
+            c.cpu,
+            c.sweep
+        );
+    }
     let mut passes = Table::new(1, &["pass", "GPU ms"]);
     for p in r.passes {
         passes.row([p.name.clone(), format!("{:.2}", p.gpu_ms)]);

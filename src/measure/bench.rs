@@ -2,6 +2,8 @@
 //! changes for all of them.
 
 use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::host::Host;
@@ -11,6 +13,7 @@ use super::results::{
     BENCH_SCHEMA_VERSION, BenchResult, Cold, Frame, Memory, PathIdentity, SceneIdentity, Scope,
 };
 use crate::Result;
+use crate::bake::{Baked, load_or_bake_scene};
 use crate::clock::monotonic_ns;
 use crate::frame::camera::Eye;
 use crate::frame::{FrameReport, Renderer, auto_exposure};
@@ -44,6 +47,25 @@ pub struct Subject {
     pub renderer: Renderer,
     /// What it took to make it; the frames are added here.
     pub cold: Cold,
+}
+
+impl Subject {
+    /// Bakes, or takes from the cache, and builds what draws a scene as planned.
+    ///
+    /// # Errors
+    /// Those of [`load_or_bake_scene`] and [`Renderer::new`].
+    pub fn new(gpu: &Gpu, scene: Scene, plan: Plan, cache: Option<&Path>, quiet: bool) -> Result<Self> {
+        let start = Instant::now();
+        let found = load_or_bake_scene(&scene, cache, quiet)?;
+        let bake_s = start.elapsed().as_secs_f64();
+        let named = scene.species.iter().zip(&found);
+        let bake_cache = named.map(|(s, (_, from))| (s.name.clone(), from.species.name().into())).collect();
+        let baked: Vec<Baked> = found.into_iter().map(|(baked, _)| baked).collect();
+        let start = Instant::now();
+        let renderer = Renderer::new(gpu, Arc::new(scene), plan, &baked)?;
+        let build_s = start.elapsed().as_secs_f64();
+        Ok(Subject { renderer, cold: Cold { bake_s, bake_cache, build_s, ..Cold::default() } })
+    }
 }
 
 /// The plan that holds every view: of the views' own plans the one that takes most memory.

@@ -152,6 +152,19 @@ impl CameraPath {
         Self::new(name, keyframes).map_err(wrong)
     }
 
+    /// Cameras, a second each: in steps of one second, its views are these.
+    pub fn through(name: &str, cameras: &[Camera]) -> Self {
+        // The last one twice: views end before the end.
+        let all = cameras.iter().chain(cameras.last()).enumerate();
+        let keyframe = |(k, c): (usize, &Camera)| Keyframe {
+            time: k as f64,
+            position: c.position,
+            target: c.target,
+            vertical_fov: c.vertical_fov,
+        };
+        CameraPath { name: name.into(), keyframes: all.map(keyframe).collect() }
+    }
+
     /// A path through keyframes; says what is wrong with them.
     fn new(name: String, keyframes: Vec<Keyframe>) -> std::result::Result<Self, String> {
         if keyframes.is_empty() {
@@ -238,6 +251,19 @@ mod tests {
             vertical_fov: 50.0,
         };
         CameraPath::new("line".into(), [1.0, 2.0, 4.0, 5.0].map(frame).to_vec()).unwrap()
+    }
+
+    #[test]
+    fn views_through_cameras_are_these() {
+        let camera = |k: f64| Camera {
+            name: "path".into(),
+            position: [k * k, 2.0, 3.0],
+            target: [0.0, k, 1.0],
+            vertical_fov: 40.0 + k,
+        };
+        let all = [1.0, 3.0, 2.0].map(camera);
+        assert_eq!(CameraPath::through("path", &all).views(1.0).unwrap(), all);
+        assert_eq!(CameraPath::through("path", &all[..1]).views(1.0).unwrap(), all[..1]);
     }
 
     /// Tangents of a straight line at constant speed are exact, whatever the keyframes' spacing.

@@ -97,11 +97,11 @@ impl Random {
 }
 
 /// Interval of a statistic at a confidence, from resampled blocks of neighbours (circular block bootstrap, percentiles).
-pub fn block_bootstrap(
-    samples: &[f64],
+pub fn block_bootstrap<T: Copy>(
+    samples: &[T],
     block: usize,
     confidence: f64,
-    statistic: impl Fn(&[f64]) -> f64,
+    statistic: impl Fn(&[T]) -> f64,
 ) -> [f64; 2] {
     let (n, block) = (samples.len(), block.clamp(1, samples.len().max(1)));
     let mut random = Random::new(n as u32);

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::scenes::{SIZE, SceneCase};
 use super::{Finding, Suite, driver_key, finding, frames, with_device};
 use crate::image::png;
+use crate::measure::metrics::flip;
 use crate::{Error, Result};
 
 /// Largest mean FLIP against a reference of the same driver build. Its images are the same to the bit on one processor; the
@@ -57,13 +58,14 @@ pub(super) fn check(suite: &Suite, case: &SceneCase) -> Result<Finding> {
     if [reference.width(), reference.height()] != SIZE {
         return Err(Error::input(&path, "", "another size than the suite's", "write it anew with --bless"));
     }
-    let (mean, map) = flip(reference.as_raw(), &actual);
+    let map = flip(SIZE, reference.as_raw(), &actual);
+    let mean = map.mean();
     let problem = (mean > bound).then(|| format!("mean FLIP {mean:.5} against {whose}, at most {bound}"));
     Ok(Finding {
         comparison: Some(Comparison {
             reference: Some((whose.clone(), bytes)),
             actual: encode(&actual)?,
-            map: Some(encode(&map)?),
+            map: Some(encode(&map.colours)?),
         }),
         ..finding(problem.as_slice(), format!("mean FLIP {mean:.5} against {whose}"))
     })
@@ -88,16 +90,6 @@ fn reference(suite: &Suite, own: &std::path::Path, file: &str) -> Result<Option<
     }))
 }
 
-/// Mean FLIP of two pictures, and its map in colours.
-fn flip(reference: &[u8], actual: &[u8]) -> (f64, Vec<u8>) {
-    let [w, h] = SIZE;
-    let image = |rgb: &[u8]| nv_flip::FlipImageRgb8::with_data(w, h, rgb);
-    let map = nv_flip::flip(image(reference), image(actual), nv_flip::DEFAULT_PIXELS_PER_DEGREE);
-    let values = map.to_vec();
-    let mean = values.iter().map(|v| f64::from(*v)).sum::<f64>() / values.len() as f64;
-    (mean, map.apply_color_lut(&nv_flip::magma_lut()).to_vec())
-}
-
 fn encode(rgb: &[u8]) -> Result<Vec<u8>> {
     png(rgb, SIZE).map_err(|e| Error::Check(format!("cannot encode a picture: {e}")))
 }
@@ -106,16 +98,20 @@ fn encode(rgb: &[u8]) -> Result<Vec<u8>> {
 mod tests {
     use super::*;
 
+    fn mean(reference: &[u8], actual: &[u8]) -> f64 {
+        flip(SIZE, reference, actual).mean()
+    }
+
     #[test]
     fn flip_sees_what_differs_and_how_much() {
         let pixels = 3 * (SIZE[0] * SIZE[1]) as usize;
         let grey = vec![128u8; pixels];
-        assert_eq!(flip(&grey, &grey).0, 0.0);
+        assert_eq!(mean(&grey, &grey), 0.0);
         let mut near = grey.clone();
         near.iter_mut().for_each(|v| *v += 4);
         let mut far = grey.clone();
         far.iter_mut().for_each(|v| *v = 255);
-        let (a, b) = (flip(&grey, &near).0, flip(&grey, &far).0);
+        let (a, b) = (mean(&grey, &near), mean(&grey, &far));
         assert!(0.0 < a && a < 0.1 && b > 0.4, "{a} {b}");
     }
 
@@ -133,7 +129,7 @@ mod tests {
         }
         // All of it 2 % brighter or darker on the display.
         let brighter: Vec<u8> = grove.iter().map(|v| (f32::from(*v) * 1.02).round() as u8).collect();
-        let (a, b) = (flip(&grove, &samples).0, flip(&grove, &brighter).0);
+        let (a, b) = (mean(&grove, &samples), mean(&grove, &brighter));
         assert!(0.0 < a && a < SAME_DRIVER, "{a}");
         assert!(b > 2.0 * SAME_DRIVER, "{b}");
         println!("ten samples {a:.6}, 2 % brighter {b:.6}");

@@ -1,0 +1,189 @@
+//! `canopy sweep`.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use canopy::bake::cache;
+use canopy::image::Layers;
+use canopy::measure::sweep::design::knobs;
+use canopy::measure::sweep::judge::judge;
+use canopy::measure::sweep::run::{PICTURES, Request, sweep};
+use canopy::measure::sweep::{SweepResult, kept, report};
+use canopy::scene::Camera;
+use canopy::settings::{KNOBS, PRESETS};
+use canopy::{Error, Result};
+
+use super::options::{self, DeviceOptions, PrintOptions};
+use super::output::{self, Table};
+
+const EXAMPLES: &str = "\
+Examples:
+  canopy sweep -o sweep                               the built-in scene: sweep/report.html, sweep.csv, sweep.json
+  canopy sweep my.toml -o s --size 640x480 --budget 2h --cameras ridge-line,near
+  canopy sweep -o s --knobs samples,view_iterations   these knobs only
+  canopy sweep -o s --reference truth/                errors against truth/CAMERA.exr, with a layer `variance` if it is noisy
+  canopy sweep -o s                                   again: goes on where it stopped
+  canopy sweep -o s1 --shard 1/2; canopy sweep -o s2 --shard 2/2; canopy sweep -o s --from s1 --from s2
+  canopy render --budget 50ms --sweep s/sweep.json    the most accurate setting that holds 50 ms there
+Order of work: presets, the knobs of balanced, those of fast and accurate, then a product of the knobs that matter most.";
+
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{}", tries_help()))]
+pub struct Args {
+    /// Scene file (TOML); left out: the built-in scene, which needs no file
+    scene: Option<PathBuf>,
+    /// Image size in pixels
+    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "320x240", value_parser = options::size)]
+    size: [u32; 2],
+    /// Cameras by name, with commas between; left out: all of the scene's
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
+    cameras: Vec<String>,
+    /// Knobs to move, with commas between; left out: all that have values to try
+    #[arg(long, value_name = "KNOB,…", value_delimiter = ',')]
+    knobs: Vec<String>,
+    /// Set one knob in all presets; repeatable
+    #[arg(long, value_name = "KNOB=VALUE", value_parser = options::assignment)]
+    set: Vec<(String, f64)>,
+    /// Linear image to hold errors against, or a folder with CAMERA.exr for each camera
+    #[arg(long, value_name = "FILE.exr|DIR")]
+    reference: Option<PathBuf>,
+    /// Frames of each camera and setting; the first only warms up
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(2..=10_000))]
+    rounds: u32,
+    /// Begin no setting after this, such as 90s, 30m or 2h; what is left is told
+    #[arg(long, value_name = "TIME", value_parser = options::time)]
+    budget: Option<Duration>,
+    /// Part K of N of the settings, such as 2/8
+    #[arg(long, value_name = "K/N", value_parser = options::shard)]
+    shard: Option<(usize, usize)>,
+    /// Take over what another sweep of the same kind measured, such as a shard; repeatable
+    #[arg(long, value_name = "DIR")]
+    from: Vec<PathBuf>,
+    /// Knobs of the product: those that matter most
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(0..=6))]
+    product: u8,
+    /// Folder for sweep.json, sweep.csv, report.html and pictures; a result in it is gone on with
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    device: DeviceOptions,
+    #[command(flatten)]
+    print: PrintOptions,
+}
+
+pub fn run(args: &Args) -> Result<()> {
+    let mut presets = BTreeMap::new();
+    for preset in PRESETS {
+        let mut settings = canopy::scene::load_at(args.scene.as_deref(), Some(preset))?.settings;
+        args.set.iter().try_for_each(|(name, value)| settings.set(name, *value))?;
+        presets.insert(preset.to_string(), settings);
+    }
+    let scene = canopy::scene::load_at(args.scene.as_deref(), None)?;
+    let cameras: Vec<Camera> = match &args.cameras[..] {
+        [] => scene.cameras.clone(),
+        names => names.iter().map(|n| scene.camera(Some(n)).cloned()).collect::<Result<_>>()?,
+    };
+    let references = match &args.reference {
+        Some(path) => references(path, &cameras, args.size)?,
+        None => Vec::new(),
+    };
+    std::fs::create_dir_all(&args.output).map_err(|e| Error::io(&args.output, e))?;
+    let request = Request {
+        scene,
+        cameras,
+        size: args.size,
+        presets,
+        knobs: knobs(&args.knobs)?,
+        rounds: args.rounds,
+        budget: args.budget.unwrap_or(Duration::MAX),
+        shard: args.shard.unwrap_or((1, 1)),
+        product: args.product.into(),
+        references,
+        cache: cache::default_dir(),
+        validate: args.device.validate,
+        quiet: args.print.quiet,
+    };
+    let result = args.device.with(|gpu| sweep(gpu, &request, &args.output, &args.from))?;
+    if let Some(file) = cache::default_dir().and_then(|dir| kept::file(&dir, &result.identity).ok()) {
+        kept::keep(&file, &result)?;
+    }
+    let write = |name: &str, text: &str| canopy::files::write_whole(&args.output.join(name), text.as_bytes());
+    write("sweep.csv", &report::csv(&result))?;
+    write("report.html", &report::html(&result, &args.output.join(PICTURES))?)?;
+    if args.print.json {
+        output::json(&result)
+    } else if args.print.quiet {
+        Ok(())
+    } else {
+        output::print(&text(&result))
+    }
+}
+
+/// The reference of each camera: the file itself for one, else CAMERA.exr in a folder.
+fn references(path: &std::path::Path, cameras: &[Camera], size: [u32; 2]) -> Result<Vec<(Layers, String)>> {
+    let file = |c: &Camera| match path.is_dir() {
+        true => path.join(format!("{}.exr", c.name)),
+        false => path.to_path_buf(),
+    };
+    if !path.is_dir() && cameras.len() > 1 {
+        return Err(Error::Usage(format!(
+            "{} is one image, and there are {} cameras; give a folder with CAMERA.exr for each, or one of --cameras",
+            path.display(),
+            cameras.len()
+        )));
+    }
+    let read = |c: &Camera| {
+        let file = file(c);
+        let layers = Layers::read(&file)?;
+        if layers.size != size {
+            let [w, h] = layers.size;
+            let remedy = format!("sweep with --size {w}x{h}");
+            return Err(Error::input(
+                &file,
+                "",
+                format!("{w}x{h} pixels, not {}x{}", size[0], size[1]),
+                remedy,
+            ));
+        }
+        let bytes = std::fs::read(&file).map_err(|e| Error::io(&file, e))?;
+        Ok((layers, canopy::files::digest(&bytes)))
+    };
+    cameras.iter().map(read).collect()
+}
+
+/// The values of every knob that is swept, for `--help`.
+fn tries_help() -> String {
+    let mut text = String::from(
+        "Values to try, to the most accurate; of each preset, those below and above it are measured:\n",
+    );
+    for k in KNOBS.iter().filter(|k| !k.tries.is_empty()) {
+        let values: Vec<String> = k.tries.iter().map(f64::to_string).collect();
+        let bakes = if k.bakes { "   (another bake each)" } else { "" };
+        text += &format!("  {} = {}{bakes}\n", k.name, values.join(", "));
+    }
+    text
+}
+
+/// The tables.
+fn text(result: &SweepResult) -> String {
+    let judged = judge(result);
+    let [w, h] = result.identity.size;
+    let mut text =
+        format!("{}, {w} x {h} on {}\n\n", result.identity.scene.name, result.identity.device.name);
+    let mut settings = Table::new(1, &report::HEADINGS);
+    for row in &judged.rows {
+        settings.row(report::cells(result, row));
+    }
+    text += &settings.text();
+    let mut paper = Table::new(1, &report::PAPER_HEADINGS);
+    report::paper(result, &judged).into_iter().for_each(|row| paper.row(row));
+    text += &format!("\n{}", paper.text());
+    for p in result.points.iter().filter(|p| !p.refused.is_empty()) {
+        text += &format!("\nrefused: {}: {}\n", p.name, p.refused);
+    }
+    if !result.left.is_empty() {
+        text += &format!("\nnot measured ({}): {}\n", result.left.len(), result.left.join("; "));
+    }
+    text
+}

@@ -1,0 +1,92 @@
+//! All metrics of one image against another.
+
+use std::collections::BTreeMap;
+
+use super::{
+    DistanceBin, Estimate, RadianceError, Region, flip_error, over_distance, radiance_error, regions,
+    relative_noise, spread, structural,
+};
+use crate::image::Layers;
+use crate::{Error, Result};
+
+/// How far an image is from its reference.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Difference {
+    /// Values of either image that are no finite numbers; metrics that meet one do not exist.
+    pub not_finite: u64,
+    /// Root of the reference's mean variance over its mean radiance; `None` for a reference without noise.
+    pub reference_noise: Option<f64>,
+    /// Error of radiance over the whole image, background included.
+    pub image: Option<RadianceError>,
+    /// The same without the background, which is right at any setting and may be brighter than all else.
+    pub foreground: Option<RadianceError>,
+    /// The same by region of the reference; regions that do not exist are left out.
+    pub regions: BTreeMap<Region, RadianceError>,
+    /// Mean FLIP of the pictures as displayed.
+    pub flip: Option<Estimate>,
+    /// Structural similarity of the luminance as displayed.
+    pub ssim: Option<Estimate>,
+    /// Radiance over the reference's by distance.
+    pub over_distance: Vec<DistanceBin>,
+    /// Largest of these ratios over the smallest, less 1.
+    pub distance_spread: Option<f64>,
+}
+
+/// All metrics of an image against a reference, both displayed at an exposure.
+///
+/// # Errors
+/// [`Error::Usage`] if they differ in size.
+pub fn difference(actual: &Layers, reference: &Layers, exposure: f64) -> Result<Difference> {
+    if actual.size != reference.size {
+        let [[w, h], [rw, rh]] = [actual.size, reference.size];
+        return Err(Error::Usage(format!(
+            "an image of {w}x{h} pixels cannot be compared with one of {rw}x{rh}"
+        )));
+    }
+    let wrong = |all: &[[f32; 3]]| all.iter().flatten().filter(|v| !v.is_finite()).count();
+    let noise = reference.variance.as_deref().unwrap_or_default();
+    let not_finite = wrong(&actual.radiance) + wrong(&reference.radiance) + wrong(noise);
+    let all = regions(reference);
+    let parts = [Region::Trees, Region::Ground, Region::Silhouettes, Region::Background];
+    let of = |region| Some((region, radiance_error(actual, reference, |k| all[k] == region)?));
+    let bins = over_distance(actual, reference);
+    Ok(Difference {
+        not_finite: not_finite as u64,
+        reference_noise: relative_noise(reference),
+        image: radiance_error(actual, reference, |_| true),
+        foreground: radiance_error(actual, reference, |k| all[k] != Region::Background),
+        regions: parts.into_iter().filter_map(of).collect(),
+        flip: flip_error(actual, reference, exposure),
+        ssim: structural(actual, reference, exposure),
+        distance_spread: spread(&bins),
+        over_distance: bins,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixtures::{mapped, texture};
+    use super::*;
+
+    #[test]
+    fn regions_part_the_image() {
+        let a = texture([60, 40], 1);
+        let d = difference(&mapped(&a, |v| 1.2 * v), &a, 1.0).unwrap();
+        let pixels: u64 = d.regions.values().map(|r| r.pixels).sum();
+        assert_eq!((pixels, d.regions.len(), d.not_finite), (2400, 4, 0));
+        assert!(d.regions.values().all(|r| (r.bias.value - 0.2).abs() < 1e-6), "{d:?}");
+        assert!(d.distance_spread.unwrap() < 1e-6 && d.flip.unwrap().value > 0.0);
+        assert!(difference(&a, &texture([40, 60], 1), 1.0).is_err());
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_counted_and_spoil_only_what_meets_them() {
+        let a = texture([60, 40], 1);
+        let mut broken = a.clone();
+        // Two values of one pixel among the trees.
+        broken.radiance[5] = [f32::NAN, 0.1, f32::INFINITY];
+        let d = difference(&broken, &a, 1.0).unwrap();
+        assert_eq!((d.not_finite, d.image, d.flip, d.ssim), (2, None, None, None));
+        assert!(!d.regions.contains_key(&Region::Trees) && d.regions.contains_key(&Region::Ground));
+    }
+}

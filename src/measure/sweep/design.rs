@@ -1,0 +1,207 @@
+//! Which settings a sweep measures, in which order.
+
+use std::collections::BTreeMap;
+
+use crate::settings::{KNOBS, Knob, PRESETS, Settings};
+use crate::{Error, Result};
+
+/// The preset that all times are relative to in the end.
+pub const HOME: &str = PRESETS[1];
+
+/// Why a setting is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Group {
+    /// A preset.
+    Preset,
+    /// One knob moved from a preset.
+    Knob,
+    /// Several knobs moved from [`HOME`].
+    Product,
+}
+
+/// A setting to measure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Preset and what differs from it, such as `balanced samples=8`.
+    pub name: String,
+    /// Preset that it is drawn in turn with; of the others' presets [`HOME`], of which itself.
+    pub base: String,
+    /// Why it is measured.
+    pub group: Group,
+    /// Knobs that differ from those of its preset.
+    pub changed: BTreeMap<String, f64>,
+    /// Every knob.
+    pub settings: Settings,
+}
+
+/// The knobs of a sweep: all that have values to try, or those named.
+///
+/// # Errors
+/// [`Error::Usage`] for a name that is no such knob.
+pub fn knobs(named: &[String]) -> Result<Vec<&'static Knob>> {
+    if named.is_empty() {
+        return Ok(KNOBS.iter().filter(|k| !k.tries.is_empty()).collect());
+    }
+    let find = |name: &String| {
+        // A knob that exists, or the settings' own message.
+        let Some(knob) = KNOBS.iter().find(|k| k.name == *name) else {
+            return Err(Settings::default().set(name, 0.0).err().unwrap_or(Error::Usage(name.clone())));
+        };
+        let fixed = Error::Usage(format!("knob \"{name}\" is no choice between time and accuracy"));
+        if knob.tries.is_empty() { Err(fixed) } else { Ok(knob) }
+    };
+    named.iter().map(find).collect()
+}
+
+/// Presets, [`HOME`] first; then each knob's values below and above that of each preset, [`HOME`]'s first. `bases` are the
+/// presets as the scene changes them. Settings that are the same as an earlier one are left out.
+///
+/// # Errors
+/// [`Error::Usage`] for a value that no knob takes.
+pub fn one_at_a_time(bases: &BTreeMap<String, Settings>, knobs: &[&Knob]) -> Result<Vec<Setting>> {
+    let mut order = vec![HOME];
+    order.extend(PRESETS.iter().filter(|p| **p != HOME));
+    let mut all: Vec<Setting> = Vec::new();
+    for name in order.iter().filter(|n| bases.contains_key(**n)) {
+        let group = Group::Preset;
+        let (changed, settings) = (BTreeMap::new(), bases[*name].clone());
+        all.push(Setting { name: name.to_string(), base: HOME.into(), group, changed, settings });
+    }
+    for name in order.iter().filter(|n| bases.contains_key(**n)) {
+        let base = &bases[*name];
+        for knob in knobs {
+            for value in knob.around(base.get(knob.name).unwrap_or(f64::NAN)) {
+                let setting = moved(name, base, &[(knob.name, value)], Group::Knob)?;
+                if all.iter().all(|s| s.settings != setting.settings) {
+                    all.push(setting);
+                }
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// Every combination of the values around those of [`HOME`], and these, of several knobs, less what `done` has.
+///
+/// # Errors
+/// [`Error::Usage`] for a value that no knob takes.
+pub fn product(home: &Settings, knobs: &[&Knob], done: &[Setting]) -> Result<Vec<Setting>> {
+    let mut moves: Vec<Vec<(&str, f64)>> = vec![Vec::new()];
+    for knob in knobs {
+        let values = knob.around(home.get(knob.name).unwrap_or(f64::NAN));
+        let with = |m: &Vec<(&'static str, f64)>, v: f64| {
+            let mut m = m.clone();
+            m.push((knob.name, v));
+            m
+        };
+        moves = moves
+            .iter()
+            .flat_map(|m| std::iter::once(m.clone()).chain(values.iter().map(|v| with(m, *v))))
+            .collect();
+    }
+    let mut all = Vec::new();
+    for m in moves {
+        let setting = moved(HOME, home, &m, Group::Product)?;
+        if done.iter().all(|s| s.settings != setting.settings) {
+            all.push(setting);
+        }
+    }
+    Ok(all)
+}
+
+/// A base with knobs moved.
+fn moved(base: &str, settings: &Settings, moves: &[(&str, f64)], group: Group) -> Result<Setting> {
+    let mut setting = Setting {
+        name: base.into(),
+        base: base.into(),
+        group,
+        changed: BTreeMap::new(),
+        settings: settings.clone(),
+    };
+    for (knob, value) in moves {
+        setting.settings.set(knob, *value)?;
+        setting.changed.insert(knob.to_string(), *value);
+        setting.name += &format!(" {knob}={value}");
+    }
+    Ok(setting)
+}
+
+/// The most accurate setting: the preset `accurate`, with every knob that is swept at the last of its values to try.
+///
+/// # Errors
+/// [`Error::Usage`] without that preset.
+pub fn most_accurate(bases: &BTreeMap<String, Settings>, knobs: &[&Knob]) -> Result<Settings> {
+    let preset = PRESETS[2];
+    let base = bases.get(preset).ok_or_else(|| Error::Usage(format!("no preset \"{preset}\"")))?;
+    let mut settings = base.clone();
+    for knob in knobs {
+        if let Some(last) = knob.tries.last() {
+            settings.set(knob.name, *last)?;
+        }
+    }
+    Ok(settings)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bases() -> BTreeMap<String, Settings> {
+        PRESETS.iter().map(|p| (p.to_string(), Settings::preset(p).unwrap())).collect()
+    }
+
+    fn some(names: &[&str]) -> Vec<&'static Knob> {
+        knobs(&names.iter().map(|n| n.to_string()).collect::<Vec<_>>()).unwrap()
+    }
+
+    #[test]
+    fn presets_come_first_and_no_setting_twice() {
+        let all = one_at_a_time(&bases(), &knobs(&[]).unwrap()).unwrap();
+        let first: Vec<&str> = all.iter().take(3).map(|s| s.name.as_str()).collect();
+        assert_eq!(first, ["balanced", "fast", "accurate"]);
+        for (k, s) in all.iter().enumerate() {
+            assert!(all[..k].iter().all(|o| o.settings != s.settings && o.name != s.name), "{}", s.name);
+            let differing = KNOBS
+                .iter()
+                .filter(|n| s.settings.get(n.name) != bases()[s.name.split(' ').next().unwrap()].get(n.name));
+            assert_eq!(differing.count(), s.changed.len(), "{}", s.name);
+        }
+        // The paper's choices all have neighbours.
+        for knob in [
+            "view_rings",
+            "view_resolution",
+            "view_iterations",
+            "zfield_min_pixels",
+            "samples",
+            "table_angles",
+            "table_densities",
+        ] {
+            assert!(all.iter().any(|s| s.base == HOME && s.changed.contains_key(knob)), "{knob}");
+        }
+        let orders: Vec<usize> = ["balanced ", "fast ", "accurate "]
+            .map(|p| all.iter().position(|s| s.name.starts_with(p)).unwrap())
+            .into();
+        assert!(orders.is_sorted(), "{orders:?}");
+    }
+
+    #[test]
+    fn products_have_every_combination_once() {
+        let home = Settings::default();
+        let two = some(&["cascades", "view_iterations"]);
+        let singles = one_at_a_time(&bases(), &two).unwrap();
+        let new = product(&home, &two, &singles).unwrap();
+        // 2 × 3 values (4 cascades are the most), less balanced itself and 1 + 2 neighbours.
+        let names: Vec<&str> = new.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!(names, ["balanced cascades=3 view_iterations=1", "balanced cascades=3 view_iterations=3"]);
+        assert_eq!(most_accurate(&bases(), &two).unwrap().view_iterations, 4);
+    }
+
+    #[test]
+    fn knobs_that_are_no_choice_are_refused() {
+        for (name, hint) in [("cascade", "\"cascades\""), ("memory_mib", "no choice")] {
+            let error = knobs(&[name.to_string()]).unwrap_err().to_string();
+            assert!(error.contains(hint), "{error}");
+        }
+    }
+}
