@@ -4,7 +4,8 @@ mod common;
 
 use std::sync::Arc;
 
-use canopy::bake::{BakeSettings, bake_species};
+use canopy::bake::{BakeSettings, LitCell, bake_species, lit_cells};
+use canopy::physics::light;
 use canopy::scene::{Mesh, OpticsOverride, Texture};
 
 const SMALL: BakeSettings = BakeSettings { rings: 3, resolution: 64, occlusion_rays: 16 };
@@ -43,16 +44,16 @@ fn half_mask() -> Arc<Texture> {
 }
 
 #[test]
-fn extinction_of_a_dense_cloud_is_half_its_leaf_area_per_volume() {
+fn a_dense_cloud_of_uniform_leaves_is_measured_as_one() {
     // 8 m² a m² of shadow: nearly every ray's first and last leaves lie near the ball's surface.
     let (radius, side) = (3.0f32, 0.2f32);
-    let volume = 4.0 / 3.0 * std::f32::consts::PI * radius.powi(3);
-    let cards = 15_000;
-    let expected = 0.5 * cards as f32 * side * side / volume;
-    let bake = bake_species(&cloud(cards, radius, side), &OpticsOverride::default(), &SMALL, true).unwrap();
-    // The z-field's envelope lies a mean free path, 1/τ, inside the ball on either side.
-    let ratio = bake.extinction / expected;
-    assert!((1.0..1.4).contains(&ratio), "{} for {expected}", bake.extinction);
+    let bake = bake_species(&cloud(15_000, radius, side), &OpticsOverride::default(), &SMALL, true).unwrap();
+    // Leaves of uniform orientation scatter as Ross's do, and there is no bark. Standard error of the mean cosine of some
+    // 15,000 lit leaves: 0.3 / sqrt(15,000) / 0.5 = 0.5 %, twice that for the fewer that are seen from behind; that what is
+    // seen and lit is the crown's rim, where the visible leaves are a little more across the ray, is allowed 5 %.
+    let [reflected, passed, bark] = bake.turned;
+    assert!((reflected - 1.0).abs() < 0.06 && (passed - 1.0).abs() < 0.07, "{:?}", bake.turned);
+    assert_eq!(bark, 0.0);
     let area = std::f32::consts::PI * radius * radius;
     assert!((bake.area / area - 1.0).abs() < 0.06, "{} for {area}", bake.area);
     assert!((bake.crown_radius / radius - 1.0).abs() < 0.03);
@@ -60,6 +61,67 @@ fn extinction_of_a_dense_cloud_is_half_its_leaf_area_per_volume() {
     // Material colour, twice halved: r + r/2.
     for (albedo, color) in bake.albedo().iter().zip([0.4, 0.5, 0.2]) {
         assert!((albedo - 1.5 * color).abs() < 1e-5, "{:?}", bake.albedo());
+    }
+}
+
+/// A ball of triangles, without leaves.
+fn ball(radius: f32) -> Mesh {
+    let mut mesh = Mesh { materials: vec![common::material(false)], ..Mesh::default() };
+    let (rows, columns) = (48, 96);
+    let at = |i: u32, j: u32| {
+        let (s, c) = (std::f32::consts::PI * i as f32 / rows as f32).sin_cos();
+        let (t, u) = (std::f32::consts::TAU * j as f32 / columns as f32).sin_cos();
+        [radius * s * u, radius * s * t, radius * (1.0 + c)]
+    };
+    for (i, j) in (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j))) {
+        let uv = [[0.0; 2]; 3];
+        common::push_triangle(&mut mesh, [at(i, j), at(i + 1, j), at(i + 1, j + 1)], uv, 0);
+        common::push_triangle(&mut mesh, [at(i, j), at(i + 1, j + 1), at(i, j + 1)], uv, 0);
+    }
+    mesh
+}
+
+/// Of a ball's visible disc (1 + cos α)/2 is lit, as of the moon's.
+#[test]
+fn a_ball_is_lit_as_the_moon_is() {
+    let mesh = ball(2.0);
+    let bake = bake_species(&mesh, &OpticsOverride::default(), &SMALL, true).unwrap();
+    let cells = lit_cells(&mesh, &bake, 5).unwrap();
+    // Edges of cells: what is unlit is in cells of its own.
+    for (low, high) in [(0, 15), (15, 30), (30, 50), (50, 75), (75, 100), (100, 130)] {
+        let within = |c: &&LitCell| (low..high).contains(&(c.angle.to_degrees() as u32));
+        let here: Vec<_> = cells.iter().filter(within).collect();
+        let mean = |of: fn(&LitCell) -> f64| {
+            here.iter().map(|c| c.weight * of(c)).sum::<f64>() / here.iter().map(|c| c.weight).sum::<f64>()
+        };
+        let (lit, moon) = (mean(|c| c.lit), mean(|c| 0.5 * (1.0 + c.angle.cos())));
+        println!("{low} to {high} degrees: {lit:.4} lit, {moon:.4} expected");
+        // The rim, where it is dark, is a texel in which the z-field is half there: 2/64 of the disc. Four thousand pairs and
+        // more have a standard error of 0.008 at most.
+        assert!((lit - moon).abs() < 0.04);
+    }
+}
+
+/// With rays that it was not fitted to: of the share that is lit, over cells of angle and distance, the law leaves less than
+/// 0.06 rms (each cell has a standard error of some 0.03 of its own), and the homogeneous medium with half the leaf area
+/// per volume twice as much.
+#[test]
+fn the_law_of_self_shadow_is_that_of_the_mesh() {
+    for name in ["oak", "pine"] {
+        let mesh = common::real_tree(name);
+        let settings = BakeSettings { rings: 6, resolution: 128, occlusion_rays: 8 };
+        let bake = bake_species(&mesh, &OpticsOverride::default(), &settings, true).unwrap();
+        let cells = lit_cells(&mesh, &bake, 11).unwrap();
+        let (c, tau) = (f64::from(bake.leaf_shadow), f64::from(bake.extinction));
+        let rms = |law: &dyn Fn(&LitCell) -> f64| {
+            let sum: f64 = cells.iter().map(|x| x.weight * (law(x) - x.lit).powi(2)).sum();
+            (sum / cells.iter().map(|x| x.weight).sum::<f64>()).sqrt()
+        };
+        let law = rms(&|x| light::self_shadow(x.angle, x.metres, c, tau));
+        // L/(2V) of this oak is 2.03 per metre, of this pine 2.00.
+        let homogeneous = rms(&|x| light::hotspot(x.angle, 0.2, 20.0) * (-2.0 * x.metres).exp());
+        println!("{name}: c {c:.3}, tau {tau:.3}, turned {:?}: {law:.4} left, {homogeneous:.4}", bake.turned);
+        assert!(law < 0.06 && homogeneous > 2.0 * law, "{name}: {law} {homogeneous}");
     }
 }
 
@@ -74,8 +136,11 @@ fn masks_take_their_share_of_the_leaf_area() {
         bake_species(&whole, &optics, &SMALL, true).unwrap(),
         bake_species(&half, &optics, &SMALL, true).unwrap(),
     );
-    // Half the leaf area, in an envelope that lies a longer free path inside the ball.
-    assert!((0.5..0.7).contains(&(b.extinction / a.extinction)), "{} {}", a.extinction, b.extinction);
+    // Half the leaves stop less of the light.
+    let through = |x: &canopy::bake::SpeciesBake| {
+        light::self_shadow(1.0, 1.0, x.leaf_shadow.into(), x.extinction.into())
+    };
+    assert!(through(&b) > 1.03 * through(&a), "{} {}", through(&a), through(&b));
     // sRGB 188 is 0.5 linear.
     assert!((b.albedo()[1] / a.albedo()[1] - 0.503).abs() < 0.01, "{:?} {:?}", a.albedo(), b.albedo());
     // The same cards a second time, as backs with their corners the other way round, count once.
@@ -86,7 +151,9 @@ fn masks_take_their_share_of_the_leaf_area() {
         doubled.triangles.push(t);
     }
     let c = bake_species(&doubled, &optics, &SMALL, true).unwrap();
-    assert_eq!(c.extinction, a.extinction);
+    // The same surfaces: only a ray that ends within rounding of one may fall on the other side of it.
+    assert!((c.extinction / a.extinction - 1.0).abs() < 0.01, "{} {}", c.extinction, a.extinction);
+    assert_eq!(c.albedo(), a.albedo());
 }
 
 #[test]

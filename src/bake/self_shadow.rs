@@ -27,7 +27,7 @@ use crate::physics::zfield::{self, Ray};
 use crate::scene::Mesh;
 
 /// Pairs of rays: every cell that matters then has hundreds, and P of it a standard error of a few hundredths.
-const PAIRS: u32 = 32_768;
+const PAIRS: u32 = 131_072;
 /// Pairs a random stream; streams are the unit of work.
 const CHUNK: u32 = 512;
 /// Edges of the cells of the phase angle, degrees, and of the distance, in half heights of the tree.
