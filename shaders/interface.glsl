@@ -52,9 +52,9 @@ struct View {
 struct Species {
     vec3 scale_to_metres;             // S: half extents of the tree box, m
     float centre;                     // height of the box's centre o above the trunk base, m
-    vec3 reflectance;                 // of a leaf
+    vec3 reflectance;                 // of the crown's leaves and twigs, at phase angle 0
     float extinction;                 // tau of the crown's self-shadow, 1/(m rad)
-    vec3 transmittance;               // of a leaf
+    vec3 transmittance;               // of the crown's leaves
     float range;                      // s_max: distance to which trees are drawn one by one, m
     float crown_radius;               // sqrt(A / pi), m
     float bounding_radius;            // of a sphere about o, m
@@ -74,6 +74,8 @@ struct Species {
     float max_thickness;              // density times area at the tables' last density
     float listed_density;             // listed trees per m2 where its map is 1; 0: not listed
     float leaf_shadow;                // c of the crown's self-shadow, 1/sqrt(rad)
+    vec3 albedo;                      // of what is seen of a crown, for the sky's light
+    float turning;                    // change of the reflectance with the phase angle, 1/rad
 };
 
 // Rows of the projection of scaled tree space into one z-field view.

@@ -101,10 +101,11 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     float density = unpackHalf2x16(s.species_density).y;
     density *= density;
     float tint = 1.0 + 0.3 * (float(s.turn_tint >> 16u) / 65535.0 - 0.5);
-    vec3 phase = leaf_phase(to_camera, v.sun_direction, kind.reflectance, kind.transmittance);
+    vec3 lit = turned_reflectance(kind.reflectance, kind.turning, angle_between(to_camera, v.sun_direction));
+    vec3 phase = leaf_phase(to_camera, v.sun_direction, lit, kind.transmittance);
     t.sun = tint * phase * hotspot(to_camera, v.sun_direction, v.hotspot_amplitude, v.hotspot_width) * v.sun_irradiance;
     // rho / 2 of a leaf that the upper hemisphere lights, times the visibility of the sky above a slope (BN12, eq. 9).
-    t.sky = tint * (kind.reflectance + kind.transmittance) * (0.25 * (1.0 + ground.z)) * v.sky_radiance;
+    t.sky = tint * kind.albedo * (0.25 * (1.0 + ground.z)) * v.sky_radiance;
     t.hole = density / (v.hole_radius * v.hole_radius);
     average_light(t, kind, to_camera, ground, density, converged(reach, v.convergence));
     t.cascade = cascade_at(v.cascade_far, v.cascade_count, distance);

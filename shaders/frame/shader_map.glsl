@@ -44,12 +44,13 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         f.gap -= share * log(max(1.0 - g.y, 1e-6));
         // Where nothing is handed over yet no tree is shown, but the mix must stay defined.
         float weight = max(part, 1e-6 * path);
-        vec3 leaf = (0.25 * (1.0 + n.z)) * (s.reflectance + s.transmittance) * view.v.sky_radiance;
+        vec3 leaf = (0.25 * (1.0 + n.z)) * s.albedo * view.v.sky_radiance;
         f.tree_sky += weight * leaf * (t.y + t.z * s.bark);
         if (HAS_SUN) {
             vec3 p = table_pair(pair_table, at, at_x, float(k), TABLE_ANGLES, TABLE_DENSITIES);
             f.joint += max(share * x * (a.sec_v + a.sec_l) * p.x, path);
-            vec3 full = leaf_phase(v, view.v.sun_direction, s.reflectance, s.transmittance) * view.v.sun_irradiance;
+            vec3 lit = turned_reflectance(s.reflectance, s.turning, angle_between(v, view.v.sun_direction));
+            vec3 full = leaf_phase(v, view.v.sun_direction, lit, s.transmittance) * view.v.sun_irradiance;
             f.tree_sun += weight * a.sun_facing * full * (p.y + p.z * s.bark);
             f.tree_lit += weight * a.sun_facing * (p.y + p.z);
         }

@@ -5,6 +5,10 @@ const float PI = 3.141592653589793;
 // Angle between two unit vectors. atan2 keeps its precision at 0 and pi, where acos loses it.
 float angle_between(vec3 a, vec3 b) { return atan(length(cross(a, b)), dot(a, b)); }
 
+// Reflectance of a crown at a phase angle: seen from beside the light, more of its leaves show their unlit side than uniform
+// ones would.
+vec3 turned_reflectance(vec3 reflectance, float turning, float angle) { return reflectance * max(1.0 + turning * angle, 0.0); }
+
 // Leaf-scale hotspot (BN12, eq. 8): 1 - a1 (1 - exp(-a2 angle)), largest at v = l.
 float hotspot(vec3 v, vec3 l, float a1, float a2) {
     return 1.0 - a1 * (1.0 - exp(-a2 * angle_between(v, l)));

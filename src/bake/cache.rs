@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use super::file::{Fields, Format, load_or_build};
-use super::{BakeSettings, SpeciesBake, ZField, bake_species, check};
+use super::{BakeSettings, SpeciesBake, Turned, ZField, bake_species, check};
 use crate::Result;
 use crate::physics::views;
 use crate::scene::{Mesh, OpticsOverride};
 
-const FORMAT: Format = Format { magic: *b"CANOPYZF", version: 7, extension: "zfield" };
-const SCALARS: usize = 21;
+const FORMAT: Format = Format { magic: *b"CANOPYZF", version: 8, extension: "zfield" };
+const SCALARS: usize = 23;
 
 /// Where a bake came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,9 +113,11 @@ fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
         b.center,
         b.radius,
         b.half_height,
-        b.turned[0],
-        b.turned[1],
-        b.turned[2],
+        b.turned.reflected,
+        b.turned.slope,
+        b.turned.passed,
+        b.turned.bark,
+        b.turned.share,
         b.leaf_shadow,
         b.extinction,
         r0,
@@ -151,9 +153,11 @@ fn decode(mut parts: Vec<Vec<u8>>, settings: &BakeSettings) -> SpeciesBake {
         center,
         radius,
         half_height,
-        k0,
-        k1,
-        k2,
+        reflected,
+        slope,
+        passed,
+        bark,
+        share,
         leaf_shadow,
         extinction,
         r0,
@@ -175,7 +179,7 @@ fn decode(mut parts: Vec<Vec<u8>>, settings: &BakeSettings) -> SpeciesBake {
         center,
         radius,
         half_height,
-        turned: [k0, k1, k2],
+        turned: Turned { reflected, slope, passed, bark, share },
         leaf_shadow,
         extinction,
         reflectance: [r0, r1, r2],

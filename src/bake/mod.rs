@@ -38,9 +38,8 @@ pub struct SpeciesBake {
     pub radius: f32,
     /// Half extent of the tree in z, m.
     pub half_height: f32,
-    /// κ of leaves' reflectance and transmittance and of the bark's reflectance: what the crown, whose visible and lit leaves are
-    /// turned as they are and grow on twigs, scatters over what uniform leaves of these colours would.
-    pub turned: [f32; 3],
+    /// How the leaves that are seen and lit are turned, and the bark among them.
+    pub turned: Turned,
     /// c of the crown's self-shadow ([`crate::physics::light::self_shadow`]), 1/√rad.
     pub leaf_shadow: f32,
     /// τ of the crown's self-shadow, 1/(m rad).
@@ -61,12 +60,43 @@ pub struct SpeciesBake {
     pub height: f32,
 }
 
+/// How what is seen and lit of a crown differs from leaves of uniform orientation: κ₀, κ₁, κ_t and κ_b of
+/// `src/bake/self_shadow.rs`, and how much of what is seen is bark.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turned {
+    /// κ₀, of the leaves' reflectance.
+    pub reflected: f32,
+    /// κ₁, 1/rad.
+    pub slope: f32,
+    /// κ_t, of the leaves' transmittance.
+    pub passed: f32,
+    /// κ_b, of the bark's reflectance.
+    pub bark: f32,
+    /// Share of bark in what is seen above the crown's base.
+    pub share: f32,
+}
+
+impl Turned {
+    /// κ₁/κ₀: change of the reflectance with the phase angle, 1/rad.
+    pub fn slope_of(&self) -> f32 {
+        if self.reflected > 0.0 { self.slope / self.reflected } else { 0.0 }
+    }
+}
+
 impl SpeciesBake {
-    /// Reflectance and transmittance of the uniform leaves that scatter as the crown does, linear RGB: κ_r r + κ_b b and κ_t t.
+    /// Reflectance (at phase angle 0; over that it changes with 1 + [`Turned::slope_of`] α) and transmittance of the uniform leaves
+    /// that scatter sunlight as the crown does, linear RGB.
     pub fn crown(&self) -> [[f32; 3]; 2] {
-        let [r, t, b] = self.turned;
-        let reflectance = std::array::from_fn(|i| r * self.reflectance[i] + b * self.bark[i]);
-        [reflectance, self.transmittance.map(|x| t * x)]
+        let k = self.turned;
+        let reflectance = std::array::from_fn(|i| k.reflected * self.reflectance[i] + k.bark * self.bark[i]);
+        [reflectance, self.transmittance.map(|x| k.passed * x)]
+    }
+
+    /// Share of the sky's light that the crown's visible surface scatters, leaves and bark, linear RGB.
+    pub fn sky_albedo(&self) -> [f32; 3] {
+        let share = self.turned.share;
+        let leaf = self.albedo();
+        std::array::from_fn(|i| (1.0 - share) * leaf[i] + share * self.bark[i])
     }
 
     /// Leaf single-scattering albedo, linear RGB: reflectance + transmittance.

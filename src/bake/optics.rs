@@ -174,7 +174,7 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
         center: frame.center,
         radius: frame.radius,
         half_height: frame.half_height,
-        turned: turned.map(|x| x as f32),
+        turned,
         leaf_shadow,
         extinction: stated.extinction.unwrap_or(extinction),
         reflectance: colours.reflectance,

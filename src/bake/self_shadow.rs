@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use super::rays::Rays;
 use super::surface::Surface;
-use super::{SpeciesBake, ZField};
+use super::{SpeciesBake, Turned, ZField};
 use crate::Result;
 use crate::physics::hash::{Stream, hash2};
 use crate::physics::light;
@@ -55,12 +55,12 @@ struct Sample {
 }
 
 /// What a crown does with light, measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     /// c and τ of [`light::self_shadow`], 1/√rad and 1/(m rad).
     pub shadow: [f64; 2],
-    /// κ of leaves' reflectance, of their transmittance, and of the bark's reflectance; see [`turned`].
-    pub turned: [f64; 3],
+    /// How its leaves are turned.
+    pub turned: Turned,
 }
 
 /// What the mesh is made of, beside its shape.
@@ -116,31 +116,54 @@ fn samples(surface: &Surface, matter: &Matter, field: &ZField, seed: u32) -> Vec
         .collect()
 }
 
-/// κ: how much more than leaves of uniform orientation (Ross 1981, [`light::leaf_phase`]) what is seen and lit of the crown sends
-/// back of the sun, for its reflectance r, its transmittance t and the reflectance b of the bark between the leaves. With n
-/// the normals of what is seen and lit, over leaves and bark alike,
+/// How what is seen and lit of the crown differs from leaves of uniform orientation (Ross 1981, [`light::leaf_phase`]), whose
+/// mean |n·l| is 2Γ_r(α) where they are seen from the lit side and 2Γ_t(α) where from the other, 0 else. Least squares over what is seen
+/// and lit, leaves and bark alike, with the angle's share of the first because it falls with α in every tree that was looked at (in an
+/// oak from 0.99 at 7° to 0.70 at 97°, while the second stays 1.2):
 ///
-/// κ_r = Σ_(leaves, seen from the lit side) |n·l| / Σ 2Γ_r(α),  κ_t = Σ_(leaves, seen from the other) |n·l| / Σ 2Γ_t(α),
-/// κ_b = Σ_bark |n·l| / Σ 2Γ_r(α),
+/// |n·l| ≈ (κ₀ + κ₁ α) 2Γ_r on leaves seen from the lit side,  κ_t 2Γ_t on leaves seen from the other,  κ_b 2Γ_r on bark.
 ///
-/// so that a crown is one of uniform leaves with reflectance κ_r r + κ_b b and transmittance κ_t t. Twigs take 4 to 7 % of what is
-/// lit in an oak and a pine; the rest is how leaves are turned, and that those that are seen and lit are not all leaves.
-fn turned(samples: &[Sample]) -> [f64; 3] {
-    let (mut sums, mut uniform) = ([0.0; 3], [0.0; 2]);
-    for s in samples.iter().filter(|s| s.lit) {
+/// Twigs take 4 to 7 % of what is lit in an oak and a pine; the rest is how leaves are turned, and that those that are seen and lit
+/// are not all leaves.
+fn turned(samples: &[Sample]) -> Turned {
+    // Of leaves from the lit side: Σ g x, Σ α g x, Σ g², Σ α g², Σ α² g²; of the two others Σ g x and Σ g².
+    let (mut lit, mut passed, mut bark) = ([0.0; 5], [0.0; 2], [0.0; 2]);
+    let (mut seen, mut seen_bark) = (0.0, 0.0);
+    for s in samples {
         let Some((foliage, same, cosine)) = s.leaf else { continue };
-        match (foliage, same) {
-            (true, true) => sums[0] += s.alpha * cosine,
-            (true, false) => sums[1] += s.alpha * cosine,
-            (false, true) => sums[2] += s.alpha * cosine,
-            (false, false) => {}
+        seen += s.alpha;
+        if !foliage {
+            seen_bark += s.alpha;
+        }
+        if !s.lit {
+            continue;
         }
         // ρp of eq. 7 is a radiance, |n·l|/π: times π.
-        uniform[0] += s.alpha * PI * light::leaf_phase(s.angle, 1.0, 0.0);
-        uniform[1] += s.alpha * PI * light::leaf_phase(s.angle, 0.0, 1.0);
+        let [g, h] = [(1.0, 0.0), (0.0, 1.0)].map(|(r, t)| PI * light::leaf_phase(s.angle, r, t));
+        let of = |wanted: bool| if wanted { cosine } else { 0.0 };
+        let x = of(foliage && same);
+        let terms = [g * x, s.angle * g * x, g * g, s.angle * g * g, s.angle * s.angle * g * g];
+        lit.iter_mut().zip(terms).for_each(|(sum, term)| *sum += s.alpha * term);
+        passed[0] += s.alpha * h * of(foliage && !same);
+        passed[1] += s.alpha * h * h;
+        bark[0] += s.alpha * g * of(!foliage && same);
+        bark[1] += s.alpha * g * g;
     }
-    let over = |k: usize, by: f64, none: f64| if by > 0.0 { sums[k] / by } else { none };
-    [over(0, uniform[0], 1.0), over(1, uniform[1], 1.0), over(2, uniform[0], 0.0)]
+    let [gx, agx, gg, agg, aagg] = lit;
+    let det = gg * aagg - agg * agg;
+    let ratio = |[a, b]: [f64; 2], none: f64| if b > 0.0 { a / b } else { none };
+    let (first, slope) = if det > 1e-9 * gg * aagg {
+        ((gx * aagg - agx * agg) / det, (agx * gg - gx * agg) / det)
+    } else {
+        (1.0, 0.0)
+    };
+    Turned {
+        reflected: first as f32,
+        slope: slope as f32,
+        passed: ratio(passed, 1.0) as f32,
+        bark: ratio(bark, 0.0) as f32,
+        share: ratio([seen_bark, seen], 0.0) as f32,
+    }
 }
 
 /// A direction of the upper hemisphere, by projected solid angle: as light comes to level ground, and goes from it.

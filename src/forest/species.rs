@@ -210,6 +210,8 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Baked], maps: &[Option<Map>], view_
             reflectance,
             extinction: bake.extinction,
             leaf_shadow: bake.leaf_shadow,
+            albedo: bake.sky_albedo(),
+            turning: bake.turned.slope_of(),
             transmittance,
             range: plan.species_range[k] as f32,
             crown_radius: bake.crown_radius,

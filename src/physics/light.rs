@@ -10,6 +10,12 @@ pub fn angle_between(a: [f64; 3], b: [f64; 3]) -> f64 {
     (c[0] * c[0] + c[1] * c[1] + c[2] * c[2]).sqrt().atan2(dot)
 }
 
+/// Reflectance of a crown at a phase angle, rad, over that at 0: seen from beside the light, more of its leaves show their unlit
+/// side than uniform ones would ([`crate::bake::Turned`]).
+pub fn turned_reflectance(turning: f64, angle: f64) -> f64 {
+    (1.0 + turning * angle).max(0.0)
+}
+
 /// Leaf-scale hotspot F (BN12, eq. 8) at a phase angle, rad: 1 − a₁ (1 − exp(−a₂ angle)).
 pub fn hotspot(angle: f64, a1: f64, a2: f64) -> f64 {
     1.0 - a1 * (1.0 - (-a2 * angle).exp())

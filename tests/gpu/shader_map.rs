@@ -104,10 +104,11 @@ fn oracle(
     for c in 0..3 {
         let (r, t, b) =
             (f64::from(row.reflectance[c]), f64::from(row.transmittance[c]), f64::from(row.bark[c]));
-        let full = light::leaf_phase(angle, r, t) * hotspot * E[c];
+        let turned = light::turned_reflectance(row.turning.into(), angle);
+        let full = light::leaf_phase(angle, r * turned, t) * hotspot * E[c];
         from_sun[c] =
             trees * a.sun_facing * full * (leaf + b * bark) + joint * ALBEDO[c] * cosine / PI * E[c];
-        let leaves = 0.25 * (1.0 + n[2]) * (r + t) * (sky_leaf + b * sky_bark);
+        let leaves = 0.25 * (1.0 + n[2]) * f64::from(row.albedo[c]) * (sky_leaf + b * sky_bark);
         from_sky[c] = SKY[c] * (trees * leaves + open * ALBEDO[c] * 0.5 * (1.0 + n[2]) * sky * contrast);
     }
     [[joint, open - joint, trees * lit, trees * (1.0 - lit)], from_sun, from_sky]
