@@ -11,8 +11,9 @@ use crate::frame::shader_map;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
 use crate::physics::light::sun_disc_fraction;
+use crate::physics::terrain::height_at;
 use crate::physics::views;
-use crate::scene::{Albedo, Camera, Distribution, Scene, Sky};
+use crate::scene::{Albedo, Camera, Distribution, Raster, Scene, Sky};
 use crate::{Error, Result};
 
 /// Seed quads along the range, at most.
@@ -25,6 +26,14 @@ const PLAIN_SIDE: f64 = 160.0;
 const COVER_SLOTS: f64 = 256.0;
 /// Storage buffers that every Vulkan device binds, when no device is known.
 const ASSUMED_STORAGE: u64 = 128 << 20;
+
+/// Pipelines of the tree pass, and for which trees.
+const TREE_PIPELINES: [(&str, &str); 4] = [
+    ("trees magnified", "near trees: texels larger than pixels, filtered estimates"),
+    ("trees", "trees of many pixels: unfiltered estimates"),
+    ("trees small", "trees of few pixels: no estimates"),
+    ("trees converged", "trees whose light is the average"),
+];
 
 /// How trees are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -98,7 +107,7 @@ impl ViewMode {
 /// One thing that the scene requires.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Item {
-    /// `data`, `cache`, `target` or `pass`.
+    /// `data`, `cache`, `target`, `pipeline` or `pass`.
     pub kind: &'static str,
     /// Name, as in captures and reports.
     pub name: String,
@@ -123,6 +132,11 @@ pub struct Plan {
     pub samples: u32,
     /// Layers of the image apart: sun, sky, coverage, species.
     pub layers: bool,
+    /// Whether trees are drawn one by one: any can come within the range of an eye. Without, the shader-map shows all.
+    pub z_fields: bool,
+    /// Whether light meets the average light that the pair tables hold (BN12, G and T): that of a sun, and where it
+    /// converges at any distance that there is.
+    pub pair_tables: bool,
     /// Shadow cascades; 0 without sun.
     pub cascades: u32,
     /// Distance that the cascades reach, m.
@@ -156,8 +170,10 @@ pub struct Plan {
     pub region_capacity: u32,
     /// Trees drawn one by one, at most.
     pub tree_capacity: u32,
-    /// Terrain tiles.
+    /// Quads of terrain in a frame, at most.
     pub terrain_tiles: u32,
+    /// Tiles of heights and slopes: as many, or the one of level ground.
+    pub height_tiles: u32,
     /// Side that no quad of the finest level of a level plain exceeds, m.
     #[serde(skip)]
     pub plain_side: f64,
@@ -165,8 +181,8 @@ pub struct Plan {
     pub coverage_size: u32,
     /// Coverage tiles.
     pub cover_slots: u32,
-    /// Layers of a coverage tile, of four channels; 0 without trees.
-    pub cover_groups: u32,
+    /// Channels of a coverage tile as stored: coverage and one a species, two or whole layers of four; 0 without trees.
+    pub cover_channels: u32,
     /// The point pattern, if any density needs it.
     #[serde(skip)]
     pub pattern: Option<Pattern>,
@@ -198,6 +214,21 @@ impl Plan {
         representation: Representation,
         device: Option<&DeviceInfo>,
     ) -> Result<Self> {
+        Self::for_path(scene, eye, &[], layers, representation, device)
+    }
+
+    /// Plans an image of a scene as an eye sees it that will also be at other places, of the same optics.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn for_path(
+        scene: &Scene,
+        eye: &Eye,
+        places: &[[f64; 3]],
+        layers: bool,
+        representation: Representation,
+        device: Option<&DeviceInfo>,
+    ) -> Result<Self> {
         let s = &scene.settings;
         let has_sun =
             sun_disc_fraction(scene.sun.elevation) > 0.0 && scene.sun.irradiance.iter().any(|e| *e > 0.0);
@@ -208,6 +239,8 @@ impl Plan {
             size: eye.size,
             samples: samples(s.samples, device),
             layers,
+            z_fields: false,
+            pair_tables: false,
             cascades: if has_sun { s.cascades } else { 0 },
             shadow_distance: 0.0,
             species_range: Vec::new(),
@@ -224,10 +257,11 @@ impl Plan {
             region_capacity: gpu::CULL_GROUP,
             tree_capacity: 1,
             terrain_tiles: if scene.terrain.heights.is_some() { 1024 } else { 1 },
+            height_tiles: 1,
             plain_side: f64::INFINITY,
             coverage_size: s.coverage_size,
             cover_slots: 0,
-            cover_groups: 0,
+            cover_channels: 0,
             pattern: None,
         };
         if scene.species.len() > gpu::MAX_SPECIES as usize {
@@ -240,6 +274,16 @@ impl Plan {
         plan.trees(scene, eye, device);
         if plan.range > 0.0 {
             plan.coverage(scene, eye, device);
+            // At a range without end the average has no share, at any distance.
+            plan.pair_tables = has_sun && representation != Representation::ZField;
+            plan.z_fields =
+                std::iter::once(&eye.position).chain(places).any(|p| plan.scene_in_range(scene, *p));
+            if !plan.z_fields {
+                (plan.seed_regions, plan.silhouette_quads, plan.tree_capacity) = (0, 0, 0);
+            }
+        }
+        if scene.terrain.heights.is_some() {
+            plan.height_tiles = plan.terrain_tiles;
         }
         let diagonal = scene.terrain.extent[0].hypot(scene.terrain.extent[1]);
         plan.shadow_distance = match f64::from(s.shadow_distance) {
@@ -263,6 +307,32 @@ impl Plan {
     /// Distance to which any tree is drawn, m: those on silhouettes go on beyond the range.
     pub fn last_range(&self) -> f64 {
         self.range * self.silhouette_reach
+    }
+
+    /// Layers of a coverage tile.
+    pub fn cover_layers(&self) -> u32 {
+        self.cover_channels.div_ceil(4)
+    }
+
+    /// Whether any tree on ground of this extent between two heights may be near enough to a place to be drawn by itself:
+    /// whether the box of their centres reaches into the range, with room for the rounding of single precision.
+    pub fn trees_in_range(&self, extent: [f64; 2], [lowest, highest]: [f64; 2], place: [f64; 3]) -> bool {
+        let (low, high) = ([0.0, 0.0, lowest], [extent[0], extent[1], highest + self.tallest]);
+        let apart: f64 = (0..3).map(|k| (place[k] - place[k].clamp(low[k], high[k])).powi(2)).sum();
+        self.representation != Representation::ShaderMap
+            && self.range > 0.0
+            && apart.sqrt() <= 1.001 * self.last_range() + 1.0
+    }
+
+    /// The same for a scene's whole terrain. Its nearest ground, below most cameras, saves looking at all of it.
+    fn scene_in_range(&self, scene: &Scene, place: [f64; 3]) -> bool {
+        let terrain = &scene.terrain;
+        let [x, y] = [0, 1].map(|k| place[k].clamp(0.0, terrain.extent[k]));
+        self.trees_in_range(terrain.extent, [height_at(terrain, x, y); 2], place)
+            || terrain
+                .heights
+                .as_ref()
+                .is_some_and(|h| self.trees_in_range(terrain.extent, height_range(h), place))
     }
 
     /// Trees: how far, in which quads, in how much memory.
@@ -355,7 +425,9 @@ impl Plan {
     /// Coverage tiles: how many, for a view at the terrain's level of detail.
     fn coverage(&mut self, scene: &Scene, eye: &Eye, device: Option<&DeviceInfo>) {
         let s = &scene.settings;
-        self.cover_groups = (1 + scene.species.len() as u32).div_ceil(4);
+        // One species needs one density beside the coverage.
+        self.cover_channels =
+            if scene.species.len() == 1 { 2 } else { 4 * (1 + scene.species.len() as u32).div_ceil(4) };
         if scene.terrain.heights.is_none() {
             self.plain_side = PLAIN_SIDE;
             self.terrain_tiles = quad_count(&scene.terrain, PLAIN_SIDE).min(1024) as u32;
@@ -365,14 +437,14 @@ impl Plan {
         let refine = (eye.pixels_at_1m / cells).max(MIN_REFINE) / MIN_REFINE;
         let wanted = (COVER_SLOTS * refine * refine).min(f64::from(self.terrain_tiles)) as u64;
         let room = (u64::from(s.memory_mib) << 20) / 4 / self.cover_tile_bytes();
-        let layers = device.map_or(2048, |d| d.max_layers) / self.cover_groups;
+        let layers = device.map_or(2048, |d| d.max_layers) / self.cover_layers();
         let most = wanted.min(quad_count(&scene.terrain, self.plain_side)).min(room).min(layers.into());
         self.cover_slots = most.max(1) as u32;
     }
 
     /// Bytes of a coverage tile with its mip levels.
     fn cover_tile_bytes(&self) -> u64 {
-        u64::from(self.cover_groups) * u64::from(self.coverage_size).pow(2) * 8 * 85 / 64
+        u64::from(self.cover_channels) * u64::from(self.coverage_size).pow(2) * 2 * 85 / 64
     }
 
     /// Writes down every item.
@@ -401,26 +473,33 @@ impl Plan {
         add(
             "cache",
             "terrain tiles",
-            format!("{} quads of heights and slopes", self.terrain_tiles),
-            u64::from(self.terrain_tiles) * tile,
+            match &scene.terrain.heights {
+                Some(_) => format!("{} quads of heights and slopes", self.height_tiles),
+                None => "level ground: all quads share one tile of no height and no slope".into(),
+            },
+            u64::from(self.height_tiles) * tile,
         );
         let trees = self.range > 0.0;
-        if trees {
+        if self.z_fields {
             let views =
                 u64::from(views::count(s.view_rings)) * u64::from(s.view_resolution).pow(2) * 4 * 4 / 3;
             for species in &scene.species {
                 let reason = format!("species \"{}\" is drawn tree by tree", species.name);
                 add("data", &format!("z-field views of {}", species.name), reason, views);
             }
+        }
+        if trees {
             let (n, m) = (u64::from(s.table_angles), u64::from(s.table_densities));
             for species in &scene.species {
-                let reason = format!("forests of species \"{}\" far away", species.name);
-                add(
-                    "data",
-                    &format!("forest tables of {}", species.name),
-                    reason,
-                    (n * n * n + n + 1) * m * 8,
-                );
+                let name = &species.name;
+                if self.pair_tables {
+                    // The share of the average grows from distance 0 on (BN12, eq. 22): no ground is so near as to go without.
+                    let reason =
+                        format!("sunlight in forests of species \"{name}\", converged to from nearby on");
+                    add("data", &format!("pair tables of {name}"), reason, n * n * n * m * 8);
+                }
+                let reason = format!("ground, skylight and trees of species \"{name}\" at any distance");
+                add("data", &format!("view tables of {name}"), reason, (n + 1) * m * 8);
             }
             let maps: Vec<[u32; 2]> =
                 scene.species.iter().filter_map(|s| density_map_size(s, scene.terrain.extent)).collect();
@@ -434,7 +513,9 @@ impl Plan {
                 let reason = "densities thin a Poisson-disk pattern".to_string();
                 add("data", "point pattern", reason, 16 * 8 * u64::from(POINTS));
             }
-            let slots = u64::from(self.seed_regions) * u64::from(self.region_capacity);
+        }
+        let slots = u64::from(self.seed_regions) * u64::from(self.region_capacity);
+        if self.z_fields {
             let near = self.seed_regions - self.silhouette_quads;
             let mut reason = format!("{near} quads of {:.0} m within {:.0} m", self.quad_side, self.range);
             if self.silhouette_quads > 0 {
@@ -442,10 +523,16 @@ impl Plan {
                 reason += &format!(", {} with silhouettes to {far:.0} m", self.silhouette_quads);
             }
             add("cache", "seeds", reason, slots * size_of::<gpu::Seed>() as u64);
+        }
+        if trees {
             add(
                 "cache",
                 "coverage tiles",
-                format!("what trees cover of {} quads of terrain, to the horizon", self.cover_slots),
+                format!(
+                    "what trees of {} species cover of {} quads of terrain, to the horizon",
+                    scene.species.len(),
+                    self.cover_slots
+                ),
                 u64::from(self.cover_slots) * self.cover_tile_bytes(),
             );
             let texels = u64::from(self.coverage_size).pow(2);
@@ -456,14 +543,16 @@ impl Plan {
                 u64::from(gpu::COVER_SCRATCH) * texels * 4,
             );
             let capacity = u64::from(self.tree_capacity);
-            add(
-                "target",
-                "trees and lists",
-                format!("up to {capacity} trees in a frame"),
-                capacity * (size_of::<gpu::Tree>() as u64 + 4 * u64::from(1 + gpu::MAX_CASCADES) + 24)
-                    + slots * 4
-                    + slots / u64::from(gpu::CULL_GROUP) * 4 * u64::from(gpu::TREE_LISTS),
-            );
+            if self.z_fields {
+                add(
+                    "target",
+                    "trees and lists",
+                    format!("up to {capacity} trees in a frame"),
+                    capacity * (size_of::<gpu::Tree>() as u64 + 4 * u64::from(1 + gpu::MAX_CASCADES) + 24)
+                        + slots * 4
+                        + slots / u64::from(gpu::CULL_GROUP) * 4 * u64::from(gpu::TREE_LISTS),
+                );
+            }
             add(
                 "target",
                 "shader-map nodes",
@@ -490,11 +579,27 @@ impl Plan {
             if self.layers { ", layers apart" } else { "" }
         );
         add("target", "image", reason, pixels * (multi + colour + 4 + 4));
+        if self.z_fields {
+            for (name, reason) in TREE_PIPELINES {
+                add("pipeline", name, reason.into(), 0);
+            }
+            if self.cascades > 0 {
+                let reason =
+                    format!("the sun is up: {} iterations to where its light enters", s.light_iterations);
+                add("pipeline", "light ray of trees", reason, 0);
+            }
+        }
         let mut pass = |name: &str, reason: &str| add("pass", name, reason.into(), 0);
-        pass("terrain tiles", "new quads of terrain");
-        if trees {
+        if scene.terrain.heights.is_some() {
+            pass("terrain tiles", "new quads of terrain");
+        }
+        if self.z_fields {
             pass("seeds", "new quads of trees");
+        }
+        if trees {
             pass("coverage tiles", "new quads of terrain with trees");
+        }
+        if self.z_fields {
             for name in ["cull", "prefix sums", "draw commands", "compact"] {
                 pass(name, "which trees are seen, in order");
             }
@@ -509,7 +614,7 @@ impl Plan {
             pass("shader-map", "trees beyond range, and average light");
         }
         pass("terrain", "the ground");
-        if trees {
+        if self.z_fields {
             pass("trees", "trees within range");
         }
         pass("tone map", "the picture for display");
@@ -550,6 +655,15 @@ impl Plan {
         }
         Ok(())
     }
+}
+
+/// The lowest and the highest height of a height map, with what its bicubic interpolation may add.
+fn height_range(heights: &Raster) -> [f64; 2] {
+    let fold = |start: f32, f: fn(f32, f32) -> f32| f64::from(heights.samples.iter().copied().fold(start, f));
+    let [low, high] = [fold(f32::INFINITY, f32::min), fold(f32::NEG_INFINITY, f32::max)];
+    // Catmull-Rom weights: at most 9/8 in each direction.
+    let room = 0.3 * (high - low);
+    [low - room, high + room]
 }
 
 /// The largest supported number of samples up to the wanted one.

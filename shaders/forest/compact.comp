@@ -28,6 +28,7 @@ layout(constant_id = 0) const int RINGS = 9;
 layout(constant_id = 1) const float RESOLUTION = 256.0;
 layout(constant_id = 2) const float TABLE_ANGLES = 16.0;
 layout(constant_id = 3) const float TABLE_DENSITIES = 8.0;
+layout(constant_id = 4) const bool PAIR_TABLES = true; // the sun's average light is known, and has a share
 layout(binding = 10) uniform sampler3D pair_table;
 layout(binding = 11) uniform sampler2DArray view_table;
 layout(binding = 12) uniform sampler2DArray heights;
@@ -54,7 +55,8 @@ void average_light(inout Tree t, Species kind, vec3 to_camera, vec3 ground, floa
     vec3 at = table_coordinates(a, TABLE_ANGLES);
     float x = table_density(density * kind.mean_area * a.up, kind.max_thickness, TABLE_DENSITIES);
     vec4 sky = table_view(view_table, at.z, x, float(t.species), TABLE_ANGLES, TABLE_DENSITIES);
-    vec3 sun = table_pair(pair_table, at, x, float(t.species), TABLE_ANGLES, TABLE_DENSITIES);
+    vec3 sun = vec3(0.0);
+    if (PAIR_TABLES) sun = table_pair(pair_table, at, x, float(t.species), TABLE_ANGLES, TABLE_DENSITIES);
     t.own = 1.0 - nu;
     t.mean_sun = (nu * a.sun_facing) * t.sun * (sun.y + sun.z * kind.bark);
     t.mean_lit = nu * a.sun_facing * (sun.y + sun.z);

@@ -6,7 +6,7 @@ layout(location = 4) flat in float cover_disc;  // log2 of the mean disc area in
 layout(location = 5) flat in uint cover_layer;  // first layer
 
 layout(binding = 6) uniform sampler2DArray cover_tiles;
-layout(constant_id = 0) const uint COVER_LAYERS = 0u; // layers a tile; 0: no trees
+layout(constant_id = 0) const uint COVER_CHANNELS = 0u; // of a tile: 2 or four a layer; 0: no trees
 layout(constant_id = 1) const float COVER_SIDE = 256.0;
 
 struct Cover {
@@ -23,9 +23,11 @@ Cover cover() {
     vec2 dx = dFdx(cover_at.xy), dy = dFdy(cover_at.xy);
     float footprint = 0.5 * log2(max(max(dot(dx, dx), dot(dy, dy)), 1e-30)) + log2(COVER_SIDE) + view.v.footprint;
     float lod = max(footprint, cover_at.z);
-    for (uint g = 0u; g < COVER_LAYERS; g++) {
+    for (uint g = 0u; 4u * g < COVER_CHANNELS; g++) {
         c.channels[g] = textureLod(cover_tiles, vec3(cover_at.xy, float(cover_layer + g)), min(lod, 3.0));
     }
+    // Missing channels read 0, and a missing fourth 1.
+    if (COVER_CHANNELS == 2u) c.channels[0].w = 0.0;
     c.texel = exp2(lod);
     // Discs fade where their mean is 1/4 to 1/16 of a texel of this level, and where levels end.
     c.resolved = clamp(0.5 * (cover_disc + 4.0) - lod, 0.0, 1.0) * clamp(3.5 - lod, 0.0, 1.0);

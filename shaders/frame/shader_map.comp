@@ -13,7 +13,7 @@ layout(local_size_x = 64) in;
 layout(binding = 3) uniform sampler2DArray slope_tiles;
 layout(binding = 6) uniform sampler2DArray cover_tiles;
 layout(std430, binding = 7) writeonly buffer Nodes { ForestNode items[]; } nodes;
-layout(constant_id = 0) const uint COVER_LAYERS = 0u;
+layout(constant_id = 0) const uint COVER_CHANNELS = 0u;
 #include "frame/shader_map.glsl"
 
 ForestNode node(TerrainQuad q, ivec2 at) {
@@ -26,7 +26,7 @@ ForestNode node(TerrainQuad q, ivec2 at) {
     vec2 cover_at = q.cover_offset + q.cover_scale * place.xy;
     vec4 channels[COVER_GROUPS];
     for (uint g = 0u; g < COVER_GROUPS; g++) channels[g] = vec4(0.0);
-    for (uint g = 0u; g < COVER_LAYERS; g++) {
+    for (uint g = 0u; 4u * g < COVER_CHANNELS; g++) {
         channels[g] = textureLod(cover_tiles, vec3(cover_at, float(q.cover_layer + g)), 2.0);
     }
     float thickness[MAX_SPECIES];

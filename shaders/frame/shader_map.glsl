@@ -13,7 +13,7 @@ layout(std140, binding = 10) uniform SpeciesTable { Species items[MAX_SPECIES]; 
 layout(constant_id = 2) const uint SPECIES_COUNT = 0u;
 layout(constant_id = 3) const float TABLE_ANGLES = 16.0;
 layout(constant_id = 4) const float TABLE_DENSITIES = 8.0;
-layout(constant_id = 5) const bool HAS_SUN = true;
+layout(constant_id = 5) const bool PAIR_TABLES = true; // the sun's average light is known, and has a share
 
 // What is seen along v (unit, to the viewer) of a slope of normal n; thickness is density times mean area of each species.
 ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIES]) {
@@ -46,7 +46,7 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         float weight = max(part, 1e-6 * path);
         vec3 leaf = (0.25 * (1.0 + n.z)) * s.albedo * view.v.sky_radiance;
         f.tree_sky += weight * leaf * (t.y + t.z * s.bark);
-        if (HAS_SUN) {
+        if (PAIR_TABLES) {
             vec3 p = table_pair(pair_table, at, at_x, float(k), TABLE_ANGLES, TABLE_DENSITIES);
             f.joint += max(share * x * (a.sec_v + a.sec_l) * p.x, path);
             vec3 lit = turned_reflectance(s.reflectance, s.turning, angle_between(v, view.v.sun_direction));

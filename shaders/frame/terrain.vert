@@ -6,7 +6,7 @@
 #include "frame/forest_node.glsl"
 
 layout(std430, binding = 7) readonly buffer Nodes { ForestNode items[]; } nodes;
-layout(constant_id = 0) const uint COVER_LAYERS = 0u;
+layout(constant_id = 0) const uint COVER_CHANNELS = 0u;
 
 layout(location = 0) out vec3 position;
 layout(location = 1) out vec2 slope_at;
@@ -39,7 +39,7 @@ void main() {
     gl_Position = view.v.clip_from_world * vec4(position, 1.0);
     tree_sun = tree_sky = paths = vec4(0.0);
     vertical = vec2(0.0);
-    if (COVER_LAYERS > 0u) {
+    if (COVER_CHANNELS > 0u) {
         // Every second vertex is a node; the others are between two, but for how far they have morphed to one.
         ivec2 at = ivec2(gl_VertexIndex % TERRAIN_HEIGHTS, gl_VertexIndex / TERRAIN_HEIGHTS);
         ivec2 low = at >> 1, high = (at + 1) >> 1;

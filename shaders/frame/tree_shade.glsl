@@ -1,5 +1,6 @@
 // One fragment of a z-field tree (BN12, section 5): iterations for the view ray and the light ray, light, depth and sample
 // mask, all from the same last fetch.
+#include "physics/light.glsl"
 #include "physics/masks.glsl"
 #include "physics/zfield.glsl"
 #include "physics/shadow.glsl"
@@ -80,8 +81,7 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
             }
             metres = max(metres, 0.0);
         }
-        // self_shadow() of physics/light.glsl, its angle in the factors.
-        float through = exp(-(own.y + sqrt(optics.y * metres)));
+        float through = self_shadow(own.y, optics.y, metres);
         vec3 entry = mix(shadow_p, shadow_c.xyz, s);
         entry.z += metres * shadow_c.w;
         uint cascade = tree_bits.w & 15u;

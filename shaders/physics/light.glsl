@@ -15,9 +15,9 @@ float hotspot(vec3 v, vec3 l, float a1, float a2) {
 }
 
 // Share of a crown's visible surface that the crown itself leaves lit, at a phase angle, after the light's way through it:
-// exp(-sqrt(angle) (c + sqrt(tau metres))).
-float self_shadow(float angle, float metres, float c, float tau) {
-    return exp(-(c * sqrt(angle) + sqrt(max(tau * angle * metres, 0.0))));
+// exp(-sqrt(angle) (c + sqrt(tau metres))), of c sqrt(angle) and tau angle, which are the same all over a tree.
+float self_shadow(float leaf, float extinction, float metres) {
+    return exp(-(leaf + sqrt(max(extinction * metres, 0.0))));
 }
 
 // Radiance of fully lit, uniformly oriented bi-Lambertian leaves per irradiance: rho p of BN12 eq. 7 from reflectance r

@@ -74,6 +74,8 @@ void main() {
             r.a = floatBitsToUint(vec4(at, table_density(b.x, b.y, b.z)));
             break;
         }
+        // As frame/tree.vert and frame/tree_shade.glsl share it between them.
+        case 15u: r.a.x = floatBitsToUint(self_shadow(a.z * sqrt(a.x), a.w * a.x, a.y)); break;
     }
     results.items[k] = r;
 }

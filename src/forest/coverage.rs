@@ -40,8 +40,10 @@ const MOST_GROUPS: u32 = 32768;
 /// Texels along a side of a workgroup's block.
 const BLOCK: u32 = 16;
 
-/// Format of the tiles.
-pub const FORMAT: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
+/// Format of tiles of so many channels.
+pub fn format(channels: u32) -> vk::Format {
+    if channels == 2 { vk::Format::R16G16_SFLOAT } else { vk::Format::R16G16B16A16_SFLOAT }
+}
 
 /// Both push constants of the production.
 #[repr(C)]
@@ -135,21 +137,27 @@ impl CoverageData {
         Ok(CoverageData {
             tiles: gpu.image(&ImageDesc {
                 name: "coverage tiles",
-                format: FORMAT,
+                format: format(plan.cover_channels),
                 size: [size; 2],
-                layers: plan.cover_slots * plan.cover_groups,
+                layers: plan.cover_slots * plan.cover_layers(),
                 levels: COVER_LEVELS,
                 samples: 1,
                 usage: vk::ImageUsageFlags::STORAGE,
             })?,
-            groups: plan.cover_groups,
+            groups: plan.cover_layers(),
             cache: SlotCache::new(plan.cover_slots),
             sums,
             quads: gpu.buffer("coverage quads", 0)?,
             splats: gpu.buffer("coverage splats", 0)?,
             jobs: gpu.buffer("coverage jobs", 0)?,
             splat: gpu.compute(&shaders::FOREST_COVERAGE_SPLAT_COMP, &constants)?,
-            resolve: gpu.compute(&shaders::FOREST_COVERAGE_RESOLVE_COMP, &constants)?,
+            resolve: gpu.compute(
+                match plan.cover_channels {
+                    2 => &shaders::FOREST_COVERAGE_RESOLVE_PAIR_COMP,
+                    _ => &shaders::FOREST_COVERAGE_RESOLVE_COMP,
+                },
+                &constants,
+            )?,
             finest,
             disc: if weight > 0.0 { area / weight } else { 0.0 },
             reach,

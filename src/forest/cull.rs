@@ -74,6 +74,7 @@ impl CullData {
             (1, float(scene.settings.view_resolution)),
             (2, float(tables.angles)),
             (3, float(tables.densities)),
+            (4, u32::from(plan.pair_tables)),
         ];
         Ok(CullData {
             trees: gpu.buffer("trees", trees * size_of::<Tree>() as u64)?,

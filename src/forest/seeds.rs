@@ -62,9 +62,10 @@ impl SeedData {
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
         let slots = u64::from(plan.seed_regions) * u64::from(plan.region_capacity);
         let (listed, listed_ranges) = bin_listed(scene, plan.quad_side);
-        let indices: Vec<u32> = (0..plan.tree_capacity.max(plan.region_capacity))
-            .flat_map(|k| [0, 1, 2, 2, 1, 3].map(|c| 4 * k + c))
-            .collect();
+        let indices: Vec<u32> =
+            (0..if plan.z_fields { plan.tree_capacity.max(plan.region_capacity) } else { 0 })
+                .flat_map(|k| [0, 1, 2, 2, 1, 3].map(|c| 4 * k + c))
+                .collect();
         let pattern = plan.pattern.as_ref().map_or_else(Vec::new, |p| p.packed());
         let heights = scene.terrain.heights.is_some();
         let mapped = |s: &&Species| density_map_size(s, scene.terrain.extent).is_some();
@@ -132,8 +133,10 @@ impl SeedData {
         self.cache.begin_frame();
         self.visible = 0;
         self.visible_quads.clear();
-        let mut visible =
-            if plan.range > 0.0 { self.select(tree, eye, plan.range, reach) } else { Vec::new() };
+        if !plan.z_fields {
+            return Ok(SeedWork::default());
+        }
+        let mut visible = self.select(tree, eye, plan.range, reach);
         if let Some(heights) = scene.terrain.heights.as_ref().filter(|_| plan.silhouette_reach > 1.0) {
             let ground = Ground { heights, terrain: &scene.terrain, lowest: tree.total_range()[0] };
             self.add_silhouettes(&ground, plan, tree, eye, &mut visible);

@@ -44,12 +44,14 @@ impl SpeciesData {
         let n = scene.settings.view_rings;
         let view_count = views::count(n);
         let resolution = scene.settings.view_resolution;
+        // One texel stands for views that nobody reads.
+        let side = if plan.z_fields { resolution } else { 1 };
         let texels = gpu.image(&ImageDesc {
             name: "z-field views",
             format: vk::Format::R8G8B8A8_UNORM,
-            size: [resolution; 2],
-            layers: (view_count * baked.len() as u32).max(1),
-            levels: resolution.ilog2() + 1,
+            size: [side; 2],
+            layers: if plan.z_fields { view_count * baked.len() as u32 } else { 1 },
+            levels: side.ilog2() + 1,
             samples: 1,
             usage: vk::ImageUsageFlags::empty(),
         })?;
@@ -57,7 +59,7 @@ impl SpeciesData {
             if bake.views.resolution != resolution || bake.views.n != n {
                 return Err(Error::Usage("a species was baked with other settings than the scene's".into()));
             }
-            for (level, bytes) in bake.views.levels.iter().enumerate() {
+            for (level, bytes) in bake.views.levels.iter().enumerate().filter(|_| plan.z_fields) {
                 gpu.upload_image(&texels, level as u32, k as u32 * view_count, view_count, bytes)?;
             }
         }

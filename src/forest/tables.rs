@@ -21,26 +21,28 @@ pub struct TableData {
 }
 
 impl TableData {
-    /// Uploads the tables of every species; all must have the same numbers of nodes.
+    /// Uploads the tables of every species; all must have the same numbers of nodes. Without pair tables, which are most of
+    /// the bytes, two texels stand for what nobody reads.
     ///
     /// # Errors
     /// [`Error::Usage`] when they differ; [`Error::Device`] when out of memory.
-    pub fn new(gpu: &Gpu, tables: &[&ForestTables]) -> Result<Self> {
+    pub fn new(gpu: &Gpu, tables: &[&ForestTables], with_pairs: bool) -> Result<Self> {
         let (n, m) = tables.first().map_or((1, 1), |t| (t.angles, t.densities));
         if tables.iter().any(|t| (t.angles, t.densities) != (n, m)) {
             return Err(Error::Usage("tables of species differ in their numbers of nodes".into()));
         }
         let count = (tables.len() as u32).max(1);
         // At least two slices, or it would not be a volume.
-        let pairs =
-            gpu.volume("pair tables", vk::Format::R16G16B16A16_SFLOAT, [n, n, (count * n * m).max(2)])?;
+        let size = if with_pairs { [n, n, (count * n * m).max(2)] } else { [1, 1, 2] };
+        let pairs = gpu.volume("pair tables", vk::Format::R16G16B16A16_SFLOAT, size)?;
         let half = |v: f32| f16::from_f32(v).to_bits();
         let mut texels: Vec<u16> = tables
             .iter()
+            .filter(|_| with_pairs)
             .flat_map(|t| &t.pair)
             .flat_map(|[w, leaf, bark]| [half(*w), half(*leaf), half(*bark), 0])
             .collect();
-        texels.resize((4 * n * n * (count * n * m).max(2)) as usize, 0);
+        texels.resize(4 * size.iter().product::<u32>() as usize, 0);
         gpu.upload_image(&pairs, 0, 0, 1, bytemuck::cast_slice(&texels))?;
         let views = gpu.image(&ImageDesc {
             name: "view tables",

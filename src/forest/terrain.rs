@@ -27,7 +27,8 @@ pub struct TerrainData {
     /// Quads of this frame: the camera's, each cascade's, then those to produce.
     pub quads: Buffer,
     cache: SlotCache<QuadKey>,
-    program: Program,
+    /// What makes tiles; level ground has but the one that it begins with.
+    program: Option<Program>,
     refine: f64,
     extent: [f64; 2],
     has_heights: bool,
@@ -91,25 +92,33 @@ impl TerrainData {
                 name,
                 format,
                 size: [side; 2],
-                layers: plan.terrain_tiles,
+                layers: plan.height_tiles,
                 levels: 1,
                 samples: 1,
                 usage: vk::ImageUsageFlags::STORAGE,
             })
         };
         let tree = Quadtree::new(terrain, plan.plain_side);
+        let height_tiles = tiles("height tiles", vk::Format::R32_SFLOAT, TERRAIN_HEIGHTS)?;
+        let slope_tiles = tiles("slope tiles", vk::Format::R16G16B16A16_SFLOAT, TERRAIN_SLOPES)?;
+        // Without relief the tile of no height and no slope serves every quad.
+        let made = plan.height_tiles > 1 || terrain.heights.is_some();
+        if !made {
+            gpu.upload_image(&height_tiles, 0, 0, 1, &[0; 4 * (TERRAIN_HEIGHTS * TERRAIN_HEIGHTS) as usize])?;
+            gpu.upload_image(&slope_tiles, 0, 0, 1, &[0; 8 * (TERRAIN_SLOPES * TERRAIN_SLOPES) as usize])?;
+        }
         Ok(TerrainData {
             heights,
             albedo,
-            height_tiles: tiles("height tiles", vk::Format::R32_SFLOAT, TERRAIN_HEIGHTS)?,
-            slope_tiles: tiles("slope tiles", vk::Format::R16G16B16A16_SFLOAT, TERRAIN_SLOPES)?,
+            height_tiles,
+            slope_tiles,
             // Each quad once for the camera, once a cascade, once when fresh.
             quads: gpu.buffer(
                 "terrain quads",
                 6 * u64::from(plan.terrain_tiles) * size_of::<TerrainQuad>() as u64,
             )?,
             cache: SlotCache::new(plan.terrain_tiles),
-            program: gpu.compute(&shaders::FOREST_TERRAIN_TILE_COMP, &[])?,
+            program: made.then(|| gpu.compute(&shaders::FOREST_TERRAIN_TILE_COMP, &[])).transpose()?,
             refine: 0.0,
             extent: terrain.extent,
             has_heights: terrain.heights.is_some(),
@@ -120,7 +129,7 @@ impl TerrainData {
 
     /// Contents thrown out of the cache so far.
     pub fn evicted(&self) -> u32 {
-        self.cache.evicted() as u32
+        if self.program.is_some() { self.cache.evicted() as u32 } else { 0 }
     }
 
     /// Push constants of draws and dispatches, from a first quad on.
@@ -189,13 +198,13 @@ impl TerrainData {
                 let quad = TerrainQuad {
                     corner,
                     spacing: spacing as i32,
-                    layer: slot.index,
+                    layer: if self.program.is_some() { slot.index } else { 0 },
                     morph: self.tree.morph(key.level, self.refine).map(|m| m as f32),
                     cover_layer: NO_PAGE,
                     ..bytemuck::Zeroable::zeroed()
                 };
                 all.push(quad);
-                if slot.fresh {
+                if slot.fresh && self.program.is_some() {
                     fresh.push(quad);
                 }
             }
@@ -222,12 +231,10 @@ impl TerrainData {
 
     /// Records the production of fresh tiles.
     pub fn produce(&self, recorder: &mut Recorder, draws: &TerrainDraws) {
-        if draws.fresh.1 == 0 {
-            return;
-        }
+        let Some(program) = self.program.as_ref().filter(|_| draws.fresh.1 > 0) else { return };
         recorder.compute("terrain tiles", |pass| {
             pass.bind(
-                &self.program,
+                program,
                 &[
                     ("quads", Resource::Buffer(&self.quads)),
                     ("heights", Resource::Texture(&self.heights, Sampler::Nearest)),

@@ -52,7 +52,7 @@ impl Ground {
                 samples: plan.samples,
                 depth: DepthTest::Reverse,
                 constants: &[
-                    (0, plan.cover_groups),
+                    (0, plan.cover_channels),
                     (1, (plan.coverage_size as f32).to_bits()),
                     (5, u32::from(plan.cascades > 0)),
                     (6, u32::from(shadowed)),
@@ -66,7 +66,7 @@ impl Ground {
             beyond: program(false)?,
             no_coverage: gpu.image(&ImageDesc {
                 name: "no coverage",
-                format: coverage::FORMAT,
+                format: coverage::format(plan.cover_channels),
                 size: [1; 2],
                 layers: 1,
                 levels: 1,
@@ -95,13 +95,10 @@ impl Ground {
             (_, 1) => sky.map(|c| [c[0], c[1], c[2], 0.0]),
             _ => sky.map(|_| [0.0; 4]),
         };
-        let colors: Vec<_> = targets
-            .colors
-            .iter()
-            .enumerate()
-            .map(|(k, t)| t.attachment(color(k), forest.is_none()))
-            .collect();
-        let depth = Some(targets.depth.attachment(Some([0.0; 4]), forest.is_none()));
+        let last = forest.is_none_or(|(f, _)| f.near.is_none());
+        let colors: Vec<_> =
+            targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), last)).collect();
+        let depth = Some(targets.depth.attachment(Some([0.0; 4]), last));
         let (tiles, nodes) =
             forest.map_or((&self.no_coverage, &self.no_nodes), |(f, map)| (&f.coverage.tiles, &map.nodes));
         recorder.render("terrain", &Targets { colors: &colors, depth, layers: 1 }, |pass| {

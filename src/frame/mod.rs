@@ -15,7 +15,6 @@ use std::sync::Arc;
 
 use tracing::info_span;
 
-use crate::Result;
 use crate::bake::Baked;
 use crate::clock::{monotonic_ns, process_cpu_ms_since, process_cpu_ns};
 use crate::forest::coverage::CoverageData;
@@ -27,8 +26,10 @@ use crate::forest::terrain::TerrainData;
 use crate::gpu::interface::View;
 use crate::gpu::{Buffer, Gpu, Timing};
 use crate::image::Picture;
+use crate::physics::light::sun_disc_fraction;
 use crate::plan::Plan;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Scene, Sun};
+use crate::{Error, Result};
 use camera::Eye;
 use cascades::Cascade;
 use ground::Ground;
@@ -50,6 +51,12 @@ pub struct Forest {
     pub species: SpeciesData,
     /// Forest tables of the species.
     pub tables: TableData,
+    /// What draws trees one by one, if any can come within range.
+    pub near: Option<NearTrees>,
+}
+
+/// Trees drawn one by one.
+pub struct NearTrees {
     /// Culling.
     pub cull: CullData,
     pass: Trees,
@@ -119,12 +126,18 @@ impl Renderer {
         let forest = if plan.range > 0.0 {
             let species = SpeciesData::new(gpu, &scene, &plan, baked)?;
             let tables: Vec<_> = baked.iter().map(|b| b.tables.as_ref()).collect();
-            let tables = TableData::new(gpu, &tables)?;
+            let tables = TableData::new(gpu, &tables, plan.pair_tables)?;
+            let near = || -> Result<NearTrees> {
+                Ok(NearTrees {
+                    cull: CullData::new(gpu, &scene, &plan, &tables)?,
+                    pass: Trees::new(gpu, &scene, &plan, species.mask_rows)?,
+                })
+            };
+            let near = plan.z_fields.then(near).transpose()?;
             Some(Forest {
                 coverage: CoverageData::new(gpu, &scene, &plan, &species, &terrain.tree)?,
                 seeds: SeedData::new(gpu, &scene, &plan)?,
-                cull: CullData::new(gpu, &scene, &plan, &tables)?,
-                pass: Trees::new(gpu, &scene, &plan, species.mask_rows)?,
+                near,
                 species,
                 tables,
             })
@@ -168,10 +181,25 @@ impl Renderer {
         self.forest.as_ref()
     }
 
+    /// Puts the sun elsewhere, or gives it another irradiance.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when it shines and the plan was made without.
+    pub fn set_sun(&mut self, sun: Sun) -> Result<()> {
+        let shines = sun_disc_fraction(sun.elevation) > 0.0 && sun.irradiance.iter().any(|e| *e > 0.0);
+        if self.plan.cascades == 0 && shines {
+            return Err(Error::Usage("the plan was made without a sun: plan again for this one".into()));
+        }
+        Arc::make_mut(&mut self.scene).sun = sun;
+        self.light = Light::new(&self.scene);
+        Ok(())
+    }
+
     /// Draws one frame and waits for it.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] when the view needs more quads or trees than the plan holds; [`crate::Error::Device`].
+    /// [`crate::Error::Usage`] when the view needs more quads or trees than the plan holds, or trees one by one where it has
+    /// none; [`crate::Error::Device`].
     pub fn render(&mut self, camera: &Camera, exposure: f64) -> Result<FrameReport> {
         self.render_eye(&Eye::new(camera, &self.scene.terrain, self.plan.size), exposure).map(|(r, _)| r)
     }
@@ -195,8 +223,16 @@ impl Renderer {
         let (start_ns, cpu) = (monotonic_ns(), process_cpu_ns());
         let evicted = self.evicted();
         let (gpu, scene, plan) = (&self.gpu, &self.scene, &self.plan);
+        let (extent, heights) = (scene.terrain.extent, self.terrain.tree.total_range());
+        if !plan.z_fields && plan.trees_in_range(extent, heights, eye.position) {
+            return Err(Error::Usage(format!(
+                "trees are within {:.0} m of this camera, and the plan was made where none are, so it draws none by itself: plan \
+                 again for this camera",
+                plan.last_range()
+            )));
+        }
         let sun = self.light.direction;
-        let [lowest, highest] = self.terrain.tree.total_range();
+        let [lowest, highest] = heights;
 
         // Stream: which quads, where in the caches, what is new.
         let streaming = info_span!("stream").entered();
@@ -225,12 +261,13 @@ impl Renderer {
                 forest.coverage.produce(r, tiles, &forest.seeds, &self.terrain, &forest.species);
             }
         });
-        if let Some(Forest { seeds, species, tables, cull, .. }) = &self.forest {
+        if let Some(Forest { seeds, species, tables, near: Some(NearTrees { cull, .. }), .. }) = &self.forest
+        {
             recorder.stage("visibility", |r| {
                 cull.record(r, &self.view, seeds, species, tables, &self.terrain);
             });
         }
-        let trees = self.forest.as_ref().map(|f| (&f.cull, &f.seeds, &f.species));
+        let trees = self.forest.as_ref().and_then(|f| Some((&f.near.as_ref()?.cull, &f.seeds, &f.species)));
         let ground = (&self.terrain, &draws);
         self.shadows.record(&mut recorder, &self.view, &self.ground.indices, ground, trees);
         recorder.stage("image", |r| {
@@ -244,8 +281,8 @@ impl Renderer {
                 map.record(r, &self.view, ground, forest);
             }
             self.ground.record(r, &self.view, ground, forest, shadow_map, &self.targets, clear);
-            if let Some(forest) = &self.forest {
-                forest.pass.record(r, &self.view, forest, shadow_map, &self.targets);
+            if let Some((forest, near)) = self.forest.as_ref().and_then(|f| f.near.as_ref().map(|n| (f, n))) {
+                near.pass.record(r, &self.view, forest, &near.cull, shadow_map, &self.targets);
             }
         });
         self.tonemap.record(&mut recorder, &self.targets, plan, exposure / self.light.scale);
@@ -256,7 +293,9 @@ impl Renderer {
         let after = self.evicted();
 
         let trees = match &self.forest {
-            Some(forest) if forest.seeds.visible > 0 => forest.cull.counts(gpu, cascades.len())?,
+            Some(Forest { seeds, near: Some(near), .. }) if seeds.visible > 0 => {
+                near.cull.counts(gpu, cascades.len())?
+            }
             _ => TreeCounts::default(),
         };
         let report = FrameReport {

@@ -32,11 +32,11 @@ impl ShaderMap {
             program: gpu.compute(
                 &shaders::FRAME_SHADER_MAP_COMP,
                 &[
-                    (0, plan.cover_groups),
+                    (0, plan.cover_channels),
                     (2, forest.species.count),
                     (3, float(forest.tables.angles)),
                     (4, float(forest.tables.densities)),
-                    (5, u32::from(plan.cascades > 0)),
+                    (5, u32::from(plan.pair_tables)),
                 ],
             )?,
         })

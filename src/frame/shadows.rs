@@ -29,7 +29,8 @@ pub struct TerrainPush {
 pub struct Shadows {
     /// Depth of the caster nearest the sun, one layer a cascade.
     pub map: Image,
-    programs: Option<(Program, Program)>,
+    /// For the terrain, and for trees if any are drawn by themselves.
+    programs: Option<(Program, Option<Program>)>,
 }
 
 impl Shadows {
@@ -69,7 +70,11 @@ impl Shadows {
             map,
             programs: Some((
                 program(&shaders::FRAME_TERRAIN_SHADOW_VERT, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[])?,
-                program(&shaders::FRAME_TREE_SHADOW_VERT, &shaders::FRAME_TREE_SHADOW_FRAG, &views)?,
+                plan.z_fields
+                    .then(|| {
+                        program(&shaders::FRAME_TREE_SHADOW_VERT, &shaders::FRAME_TREE_SHADOW_FRAG, &views)
+                    })
+                    .transpose()?,
             )),
         })
     }
@@ -116,7 +121,7 @@ impl Shadows {
                 pass.push(&TerrainPush { parameters, cascade: c as u32 });
                 pass.draw_indexed(indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, 0..*count);
             }
-            let Some((cull, seeds, species)) = trees else { return };
+            let Some((tree, (cull, seeds, species))) = tree.as_ref().zip(trees) else { return };
             pass.bind(
                 tree,
                 &[

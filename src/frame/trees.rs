@@ -3,6 +3,7 @@
 use super::Forest;
 use super::targets::ImageTargets;
 use crate::Result;
+use crate::forest::cull::CullData;
 use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand};
 use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets, shaders,
@@ -43,7 +44,8 @@ impl Trees {
                     (2, mask_rows),
                     (3, plan.samples),
                     (4, estimates),
-                    (5, s.light_iterations),
+                    // Without sun no ray goes to it.
+                    (5, if plan.cascades > 0 { s.light_iterations } else { 0 }),
                     (6, u32::from(plan.cascades > 0)),
                     (7, u32::from(magnified)),
                     (8, u32::from(converged)),
@@ -67,6 +69,7 @@ impl Trees {
         recorder: &mut Recorder,
         view: &Buffer,
         forest: &Forest,
+        cull: &CullData,
         shadow_map: &Image,
         targets: &ImageTargets,
     ) {
@@ -78,8 +81,8 @@ impl Trees {
             }
             let bound = [
                 ("view", Resource::Buffer(view)),
-                ("trees", Resource::Buffer(&forest.cull.trees)),
-                ("lists", Resource::Buffer(&forest.cull.lists)),
+                ("trees", Resource::Buffer(&cull.trees)),
+                ("lists", Resource::Buffer(&cull.lists)),
                 ("species", Resource::Buffer(&forest.species.table)),
                 ("bases", Resource::Buffer(&forest.species.bases)),
                 ("masks", Resource::Buffer(&forest.species.masks)),
@@ -89,7 +92,7 @@ impl Trees {
             for (k, program) in self.programs.iter().enumerate() {
                 pass.bind(program, &bound);
                 let command = (k * size_of::<DrawCommand>()) as u64;
-                pass.draw_indexed_indirect(&forest.seeds.quad_indices, &forest.cull.commands, command);
+                pass.draw_indexed_indirect(&forest.seeds.quad_indices, &cull.commands, command);
             }
         });
     }

@@ -115,6 +115,7 @@ mod tests {
             coverage: vec![0.0; 6],
             species: vec![0; 6],
             fractions: (0..6).map(|k| [0.0, 0.25, 0.5, value(k)]).collect(),
+            noise: None,
         };
         let picture = Picture { size: [3, 2], display: vec![0; 24], linear: Some(linear) };
         picture.write_exr(&path).unwrap();

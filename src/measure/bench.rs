@@ -68,15 +68,18 @@ impl Subject {
     }
 }
 
-/// The plan that holds every view: of the views' own plans the one that takes most memory.
+/// The plan that holds every view: of the views' plans, each of which knows where the others are, the one that takes most
+/// memory.
 ///
 /// # Errors
 /// As [`Plan::new`].
 pub fn plan(scene: &Scene, views: &[Camera], size: [u32; 2], gpu: &Gpu) -> Result<Plan> {
     let mut largest: Option<Plan> = None;
-    for view in views {
-        let eye = Eye::new(view, &scene.terrain, size);
-        let plan = Plan::for_eye(scene, &eye, false, Default::default(), Some(gpu.info()))?;
+    let eyes: Vec<Eye> = views.iter().map(|v| Eye::new(v, &scene.terrain, size)).collect();
+    // A narrower view's range is longer: each optics with every place.
+    let places: Vec<[f64; 3]> = eyes.iter().map(|e| e.position).collect();
+    for eye in &eyes {
+        let plan = Plan::for_path(scene, eye, &places, false, Default::default(), Some(gpu.info()))?;
         if largest.as_ref().is_none_or(|l| plan.bytes() > l.bytes()) {
             largest = Some(plan);
         }

@@ -197,8 +197,10 @@ pub fn measure(
     let centres = centres(method.patches, request.slope);
     let eye =
         |view: [f64; 2], centre: [f64; 2]| eye(&patch.terrain, view, centre, away, method, pixels_at_1m);
-    let plan =
-        Plan::for_eye(&patch, &eye([0.0, 0.0], centres[0]), true, request.representation, Some(gpu.info()))?;
+    let places: Vec<[f64; 3]> =
+        request.views.iter().flat_map(|v| centres.iter().map(|c| eye(*v, *c).position)).collect();
+    let first = eye([0.0, 0.0], centres[0]);
+    let plan = Plan::for_path(&patch, &first, &places, true, request.representation, Some(gpu.info()))?;
     let mut renderer = Renderer::new(gpu, patch.clone(), plan, baked)?;
     let mut results = Vec::new();
     for view in &request.views {

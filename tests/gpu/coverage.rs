@@ -49,9 +49,11 @@ fn draw(gpu: &Gpu, scene: &Scene, camera: &Camera) -> Frame {
     let mut renderer = device::renderer(gpu, scene, camera, SIZE, false);
     let report = renderer.render(camera, 1.0).unwrap();
     let halves = held(gpu, &renderer);
-    let float = |h: &[u16]| [0, 1, 2, 3].map(|k| f64::from(f16::from_bits(h[k])));
-    let texels = |level: &Vec<u16>| level.chunks_exact(4).map(float).collect();
     let plan = renderer.plan().clone();
+    let float =
+        |h: &[u16]| [0, 1, 2, 3].map(|k| h.get(k).map_or(0.0, |bits| f64::from(f16::from_bits(*bits))));
+    let channels = plan.cover_channels.min(4) as usize;
+    let texels = |level: &Vec<u16>| level.chunks_exact(channels).map(float).collect();
     let rows = &renderer.forest().unwrap().species.rows;
     Frame {
         report,

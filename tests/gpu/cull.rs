@@ -44,7 +44,7 @@ fn hills() -> Scene {
 /// each cascade.
 fn check(gpu: &Gpu, renderer: &Renderer, view: &View) -> (usize, usize, Vec<usize>) {
     let forest = renderer.forest().unwrap();
-    let (seeds, cull) = (&forest.seeds, &forest.cull);
+    let (seeds, cull) = (&forest.seeds, &forest.near.as_ref().unwrap().cull);
     let capacity = seeds.region_capacity as usize;
     let plan = renderer.plan();
     let all: Vec<canopy::gpu::interface::Seed> =
@@ -215,7 +215,7 @@ fn the_sets_of_two_frames_do_not_depend_on_what_came_between() {
         let eye = Eye::new(camera, &scene.terrain, [96, 64]);
         let (report, _) = renderer.render_eye(&eye, 1.0).unwrap();
         let forest = renderer.forest().unwrap();
-        gpu.read(&forest.cull.trees, 0, report.trees.records as usize).unwrap()
+        gpu.read(&forest.near.as_ref().unwrap().cull.trees, 0, report.trees.records as usize).unwrap()
     };
     let first = trees(&home);
     trees(&device::camera([100.0, 800.0, 90.0], [300.0, 300.0, 0.0]));

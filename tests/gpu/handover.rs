@@ -68,3 +68,22 @@ fn ground_between_trees_is_as_open_as_the_oracle_says() {
     worst.within(1.0, "open ground");
     gpu.close().unwrap();
 }
+
+#[test]
+fn the_average_light_comes_in_as_the_oracle_says_from_a_centimetre_to_a_thousand_kilometres() {
+    let gpu = device::open();
+    let mut cases: Vec<[f32; 3]> = Vec::new();
+    for k in 0..=160 {
+        let distance = 10f32.powf(-2.0 + 0.05 * k as f32);
+        cases.extend([0.1, 30.0, 3000.0, 1e15].map(|range| [distance / range, 0.45, 0.5]));
+    }
+    let arguments: Vec<Arguments> = cases.iter().map(|c| words(c)).collect();
+    let mut worst = Worst::default();
+    for (c, out) in cases.iter().zip(evaluate(&gpu, Function::Handover, &arguments)) {
+        let (got, want) = (float(&out, 0), handover::converged(f64::from(c[0]), f64::from(c[1])));
+        // Relative, however small: twice a division of 2.5 ulp, and four operations. Squares of less than 1e-19 vanish.
+        worst.note((got - want).abs() / (want * 16.0 * EPS + 1.2e-38), || format!("{c:?}: {got} {want}"));
+    }
+    worst.within(1.0, "share of the average");
+    gpu.close().unwrap();
+}

@@ -233,3 +233,35 @@ fn hashes_are_equal_to_the_bit() {
     }
     gpu.close().unwrap();
 }
+
+#[test]
+fn self_shadow_is_that_of_the_oracle_from_no_angle_to_opposite_and_in_any_crown() {
+    let gpu = device::open();
+    let angles: Vec<f64> = (-14..=-2)
+        .flat_map(|k| [10f64.powf(0.5 * f64::from(k)), PI - 10f64.powf(0.5 * f64::from(k))])
+        .chain([0.0, 0.5, 1.5, 3.0, PI])
+        .collect();
+    let mut cases: Vec<[f32; 4]> = Vec::new();
+    for angle in angles {
+        for metres in [-1.0, 0.0, 1e-9, 1e-4, 0.01, 0.3, 3.0, 50.0, 1e3, 1e6] {
+            for (c, tau) in [(0.5, 0.55), (0.0, 0.0), (2.0, 1e-9), (0.0, 1e3)] {
+                cases.push([angle as f32, metres, c, tau]);
+            }
+        }
+    }
+    let arguments: Vec<Arguments> = cases.iter().map(|c| words(c)).collect();
+    let mut worst = Worst::default();
+    for (case, out) in cases.iter().zip(evaluate(&gpu, Function::SelfShadow, &arguments)) {
+        let [angle, metres, c, tau] = case.map(f64::from);
+        let (got, want) = (float(&out, 0), light::self_shadow(angle, metres, c, tau));
+        // The exponent's terms to three roundings and a root of 3 ulp, which counts as much of the result; exp to
+        // (3 + 2x) ulp. Below the smallest normal number there may be nothing.
+        let depth = -want.max(1e-300).ln();
+        let room = want * EPS * (10.0 * depth + 2.0 * (3.0 + 2.0 * depth)) + 1.2e-38;
+        worst.note((got - want).abs() / room, || format!("{case:?}: {got} {want}"));
+        assert!((0.0..=1.0).contains(&got), "{case:?}: {got}");
+        assert!(angle > 0.0 || got == 1.0, "what is seen along the light is lit: {case:?} {got}");
+    }
+    worst.within(1.0, "self-shadow, in units of its bound");
+    gpu.close().unwrap();
+}

@@ -13,6 +13,7 @@ mod ground;
 mod handover;
 mod light;
 mod light_on_ground;
+mod paths;
 mod plan;
 mod seeds;
 mod shader_map;

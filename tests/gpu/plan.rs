@@ -1,9 +1,17 @@
-//! What a scene does not require is neither planned, allocated nor drawn.
+//! What a scene does not require is neither planned, allocated nor drawn; and what is left out changes no bit of the image.
+
+use std::sync::Arc;
 
 use crate::device;
+use canopy::Error;
+use canopy::frame::Renderer;
+use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
-use canopy::plan::Plan;
-use canopy::scene::{Distribution, Scene};
+use canopy::image::{Linear, Picture};
+use canopy::plan::{Plan, Representation};
+use canopy::scene::{Camera, Distribution, Raster, Scene};
+
+const SIZE: [u32; 2] = [64, 48];
 
 fn scene() -> Scene {
     device::small_scene(
@@ -21,23 +29,56 @@ struct Drawn {
     planned: u64,
 }
 
-/// Plans, builds and draws; the frame's passes are those of the plan.
+/// Plans, builds and draws.
 fn draw(gpu: &Gpu, scene: &Scene) -> Drawn {
-    let camera = &scene.cameras[0];
-    let mut renderer = device::renderer(gpu, scene, camera, [64, 48], false);
-    let report = renderer.render(camera, 1.0).unwrap();
+    let plan = Plan::new(scene, &scene.cameras[0], SIZE, false, Some(gpu.info())).unwrap();
+    drawn(gpu, scene, plan).0
+}
+
+/// Builds and draws what is planned; the frame's passes are those of the plan.
+fn drawn(gpu: &Gpu, scene: &Scene, plan: Plan) -> (Drawn, Picture) {
+    let mut renderer = Renderer::new(gpu, Arc::new(scene.clone()), plan, &device::bake(scene)).unwrap();
+    let report = renderer.render(&scene.cameras[0], 1.0).unwrap();
     let plan = renderer.plan();
     let passes: Vec<String> = report.timing.passes.iter().map(|p| p.name.clone()).collect();
     let planned: Vec<String> =
         plan.items.iter().filter(|i| i.kind == "pass").map(|i| i.name.clone()).collect();
     assert_eq!(passes, planned, "what is drawn is what is planned, in order");
     assert!(plan.items.iter().all(|i| !i.reason.is_empty()));
-    Drawn {
+    let drawn = Drawn {
         items: plan.items.iter().filter(|i| i.kind != "pass").map(|i| i.name.clone()).collect(),
         passes,
         allocated: gpu.memory_report(),
         planned: plan.bytes(),
-    }
+    };
+    (drawn, renderer.picture().unwrap())
+}
+
+/// The picture under a plan that need not list what is drawn.
+fn picture(gpu: &Gpu, scene: &Scene, plan: Plan) -> Picture {
+    let mut renderer = Renderer::new(gpu, Arc::new(scene.clone()), plan, &device::bake(scene)).unwrap();
+    renderer.render(&scene.cameras[0], 1.0).unwrap();
+    renderer.picture().unwrap()
+}
+
+/// The plan of the scene's camera, with layers.
+fn planned(gpu: &Gpu, scene: &Scene, how: Representation) -> Plan {
+    let eye = Eye::new(&scene.cameras[0], &scene.terrain, SIZE);
+    Plan::for_eye(scene, &eye, true, how, Some(gpu.info())).unwrap()
+}
+
+/// All but the fractions, which tell lit from shadowed where there is no sun too.
+fn same_light(a: &Picture, b: &Picture) -> bool {
+    let light = |p: &Picture| Linear { fractions: Vec::new(), ..p.linear.clone().unwrap() };
+    a.display == b.display && light(a) == light(b)
+}
+
+/// Hills, 10 m high.
+fn hills(scene: &mut Scene) {
+    let samples =
+        (0..961u32).map(|k| 5.0 + 5.0 * ((k % 31) as f32 * 0.9).sin() * ((k / 31) as f32 * 0.7).cos());
+    scene.terrain.heights = Some(Raster { width: 31, height: 31, samples: samples.collect() });
+    scene.terrain.cell_size = 10.0;
 }
 
 impl Drawn {
@@ -87,7 +128,10 @@ fn without_trees_there_is_no_forest() {
         "coverage sums",
         "point pattern",
         "trees and lists",
-        "forest tables of a",
+        "pair tables of a",
+        "view tables of a",
+        "trees converged",
+        "light ray of trees",
         "shader-map nodes",
     ];
     assert!(tree_passes.iter().all(|p| forest.draws(p)), "{:?}", forest.passes);
@@ -172,5 +216,131 @@ fn a_plan_beyond_the_budget_is_refused_with_its_largest_items() {
     let e = Plan::new(&scene, &scene.cameras[0], [64, 48], false, Some(gpu.info())).unwrap_err();
     assert_eq!(e.exit_code(), 2);
     assert!(e.to_string().contains("shadow cascades"), "{e}");
+    gpu.close().unwrap();
+}
+
+#[test]
+fn without_a_sun_there_is_no_light_ray_and_no_average_of_its_light() {
+    let gpu = device::open();
+    let mut scene = scene();
+    let unreduced = planned(&gpu, &scene, Representation::Auto);
+    let (day, _) = drawn(&gpu, &scene, unreduced.clone());
+    assert!(day.has("light ray of trees") && day.has("pair tables of a") && day.has("trees magnified"));
+    scene.sun.irradiance = [0.0; 3];
+    let (overcast, reduced) = drawn(&gpu, &scene, planned(&gpu, &scene, Representation::Auto));
+    assert!(!overcast.has("light ray of trees") && !overcast.has("pair tables of a"));
+    assert!(overcast.has("view tables of a") && overcast.has("trees magnified") && overcast.draws("trees"));
+    // Two texels stand for the tables that nobody reads.
+    let [with, without] = [&day, &overcast].map(|d| d.bytes("pair tables"));
+    assert!(without <= 1024 && with >= 6 * 6 * 18 * 8, "{with} {without}");
+    assert!(overcast.planned < day.planned);
+    assert!(reduced.linear.as_ref().unwrap().coverage.iter().any(|c| *c > 0.5), "no tree is seen");
+    assert!(same_light(&reduced, &picture(&gpu, &scene, unreduced)));
+    gpu.close().unwrap();
+}
+
+#[test]
+fn level_ground_is_one_tile_without_slopes() {
+    let gpu = device::open();
+    let mut scene = scene();
+    let plan = planned(&gpu, &scene, Representation::Auto);
+    assert!(plan.terrain_tiles > 1 && plan.height_tiles == 1);
+    let (level, reduced) = drawn(&gpu, &scene, plan.clone());
+    assert!(!level.draws("terrain tiles") && !level.has("height map"));
+    assert!(reduced == picture(&gpu, &scene, Plan { height_tiles: plan.terrain_tiles, ..plan }));
+    hills(&mut scene);
+    let relief = draw(&gpu, &scene);
+    assert!(relief.draws("terrain tiles") && relief.has("height map"));
+    for name in ["slope tiles", "height tiles"] {
+        assert!(level.bytes(name) > 0 && relief.bytes(name) > 500 * level.bytes(name), "{name}");
+    }
+    gpu.close().unwrap();
+}
+
+#[test]
+fn from_afar_no_tree_is_drawn_by_itself() {
+    let gpu = device::open();
+    for relief in [false, true] {
+        let mut scene = scene();
+        if relief {
+            hills(&mut scene);
+        }
+        let near = scene.cameras[0].clone();
+        // 240 pixels a metre at one metre: trees of 14 m are less than two pixels.
+        let away = Camera { position: [150.0, -9000.0, 5000.0], vertical_fov: 3.0, ..near.clone() };
+        let [here, there] = [&near, &away].map(|c| Eye::new(c, &scene.terrain, SIZE));
+        scene.settings.set("silhouette_min_pixels", 3.0).unwrap();
+        scene.settings.set("zfield_min_pixels", 3.0).unwrap();
+        let device = Some(gpu.info());
+        let plan =
+            |place: &[[f64; 3]]| Plan::for_path(&scene, &there, place, true, Representation::Auto, device);
+        let (reduced, unreduced) = (plan(&[]).unwrap(), plan(&[here.position]).unwrap());
+        assert!(!reduced.z_fields && unreduced.z_fields && reduced.last_range() < 9000.0);
+        let mut far = scene.clone();
+        far.cameras[0] = away;
+        let ((without, image), whole) = (drawn(&gpu, &far, reduced.clone()), picture(&gpu, &far, unreduced));
+        let (with, _) = drawn(&gpu, &scene, planned(&gpu, &scene, Representation::Auto));
+        for item in ["seeds", "z-field views of a", "trees and lists", "trees", "light ray of trees"] {
+            assert!(with.has(item) && !without.has(item), "{item}");
+        }
+        for pass in ["seeds", "cull", "prefix sums", "draw commands", "compact", "trees"] {
+            assert!(with.draws(pass) && !without.draws(pass), "{pass}");
+        }
+        for item in ["coverage tiles", "shader-map nodes", "view tables of a", "pair tables of a"] {
+            assert!(without.has(item), "{item}");
+        }
+        for name in ["seeds", "trees", "tree lists", "seed classes", "z-field views", "view bases"] {
+            assert!(with.bytes(name) > 0 && without.bytes(name) <= 1024, "{name}: {}", without.bytes(name));
+        }
+        assert!(without.planned < with.planned);
+        assert!(image == whole, "relief {relief}");
+        let trees: f32 = image.linear.unwrap().fractions.iter().map(|f| f[2] + f[3]).sum();
+        assert!(trees > 10.0, "no forest is seen: {trees}");
+        let mut renderer =
+            Renderer::new(&gpu, Arc::new(scene.clone()), reduced, &device::bake(&scene)).unwrap();
+        let refused = renderer.render(&near, 1.0).unwrap_err();
+        assert!(matches!(&refused, Error::Usage(text) if text.contains("plan again")), "{refused}");
+    }
+    gpu.close().unwrap();
+}
+
+#[test]
+fn a_chosen_representation_needs_nothing_of_the_other() {
+    let gpu = device::open();
+    let scene = scene();
+    let auto = planned(&gpu, &scene, Representation::Auto);
+    assert!(auto.z_fields && auto.pair_tables);
+    // Trees at any distance never converge to an average.
+    let plan = planned(&gpu, &scene, Representation::ZField);
+    let (trees, reduced) = drawn(&gpu, &scene, plan.clone());
+    assert!(trees.draws("trees") && !trees.has("pair tables of a") && trees.bytes("pair tables") <= 1024);
+    assert!(reduced == picture(&gpu, &scene, Plan { pair_tables: true, ..plan }));
+    // No tree stands by itself where the shader-map shows all.
+    let plan = planned(&gpu, &scene, Representation::ShaderMap);
+    let (map, reduced) = drawn(&gpu, &scene, plan.clone());
+    assert!(map.has("pair tables of a") && !map.has("seeds") && !map.draws("trees"));
+    let Plan { seed_regions, tree_capacity, .. } = auto;
+    assert!(reduced == picture(&gpu, &scene, Plan { z_fields: true, seed_regions, tree_capacity, ..plan }));
+    gpu.close().unwrap();
+}
+
+#[test]
+fn one_species_has_one_density() {
+    let gpu = device::open();
+    let mut scene = scene();
+    let plan = planned(&gpu, &scene, Representation::Auto);
+    assert_eq!((plan.cover_channels, plan.cover_layers()), (2, 1));
+    let (two, reduced) = drawn(&gpu, &scene, plan.clone());
+    let (four, whole) = drawn(&gpu, &scene, Plan { cover_channels: 4, ..plan });
+    let [two, four] = [two, four].map(|d| d.bytes("coverage tiles"));
+    // But for the padding of allocations.
+    assert!(four.abs_diff(2 * two) < four / 50, "{two} {four}");
+    assert!(reduced == whole);
+    let one = scene.species[0].clone();
+    for (count, layers) in [(3, 1), (4, 2), (8, 3)] {
+        scene.species = vec![one.clone(); count];
+        let plan = planned(&gpu, &scene, Representation::Auto);
+        assert_eq!((plan.cover_channels, plan.cover_layers()), (4 * layers, layers), "{count} species");
+    }
     gpu.close().unwrap();
 }

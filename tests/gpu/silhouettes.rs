@@ -50,7 +50,7 @@ fn set_range(scene: &mut Scene, range: f64, reach: f64) {
 /// Draws a frame; the camera's trees.
 fn trees(gpu: &Gpu, renderer: &mut Renderer, eye: &Eye) -> (Vec<Tree>, View) {
     let (report, view) = renderer.render_eye(eye, 1.0).unwrap();
-    let cull = &renderer.forest().unwrap().cull;
+    let cull = &renderer.forest().unwrap().near.as_ref().unwrap().cull;
     let list: Vec<u32> = gpu.read(&cull.lists, 0, report.trees.camera as usize).unwrap();
     let all: Vec<Tree> = gpu.read(&cull.trees, 0, report.trees.records as usize).unwrap();
     (list.iter().map(|k| all[*k as usize]).collect(), view)
@@ -64,7 +64,8 @@ fn seeds(gpu: &Gpu, renderer: &Renderer) -> Vec<(SeedQuad, Seed, u32)> {
     let all: Vec<Seed> = gpu.read(&forest.seeds.seeds, 0, regions * capacity).unwrap();
     let counts: Vec<DrawCommand> = gpu.read(&forest.seeds.draws, 0, regions).unwrap();
     let quads = &forest.seeds.visible_quads;
-    let classes: Vec<u32> = gpu.read(&forest.cull.classes, 0, quads.len() * capacity).unwrap();
+    let classes: Vec<u32> =
+        gpu.read(&forest.near.as_ref().unwrap().cull.classes, 0, quads.len() * capacity).unwrap();
     let mut found = Vec::new();
     for (k, quad) in quads.iter().enumerate() {
         let region = quad.region as usize;

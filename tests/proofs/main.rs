@@ -12,6 +12,7 @@ mod effects;
 mod planted;
 mod plot;
 mod popping;
+mod precision;
 mod scale;
 mod soak;
 

@@ -31,6 +31,7 @@ pub enum Function {
     Handover,
     TableAngles,
     TableCoordinates,
+    SelfShadow,
 }
 
 /// The results of a function for many arguments.

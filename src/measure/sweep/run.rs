@@ -257,8 +257,13 @@ impl Runner<'_> {
     /// Draws a camera's image, and one a little nearer to its target.
     fn shot(&self, settings: &Settings, camera: &Camera) -> Result<Shot> {
         let scene = self.scene(settings);
-        let eye = Eye::new(camera, &scene.terrain, self.request.size);
-        let plan = Plan::for_eye(&scene, &eye, true, Representation::Auto, Some(self.gpu.info()))?;
+        let mut nearer = camera.clone();
+        for (p, t) in nearer.position.iter_mut().zip(camera.target) {
+            *p += MOVE * (t - *p);
+        }
+        let [eye, there] = [camera, &nearer].map(|c| Eye::new(c, &scene.terrain, self.request.size));
+        let device = Some(self.gpu.info());
+        let plan = Plan::for_path(&scene, &eye, &[there.position], true, Representation::Auto, device)?;
         let exposure = auto_exposure(&scene);
         let cache = self.request.cache.as_deref();
         let mut renderer = Subject::new(self.gpu, scene, plan, cache, self.request.quiet)?.renderer;
@@ -266,10 +271,6 @@ impl Runner<'_> {
             renderer.render(camera, exposure)?;
             Layers::of(&renderer.picture()?).ok_or_else(|| Error::Check("a frame without layers".into()))
         };
-        let mut nearer = camera.clone();
-        for (p, t) in nearer.position.iter_mut().zip(camera.target) {
-            *p += MOVE * (t - *p);
-        }
         let here = draw(camera)?;
         let moved = match draw(&nearer) {
             Err(Error::Usage(_)) => None,
