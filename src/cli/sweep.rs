@@ -24,6 +24,7 @@ Examples:
   canopy sweep -o sweep                               the built-in scene: sweep/report.html, sweep.csv, sweep.json
   canopy sweep my.toml -o s --size 640x480 --budget 2h --cameras ridge-line,near
   canopy sweep -o s --knobs samples,view_iterations   these knobs only
+  canopy sweep -o s --knobs view_rings=4/6/9 --product 0  these values only, around balanced
   canopy sweep -o s --reference truth/                errors against truth/CAMERA.exr, with a layer `variance` if it is noisy
   canopy sweep -o s --reference none                  errors against the most accurate setting only
   canopy sweep -o s --reference-until 1% --bounces full   a better reference, with light of all orders
@@ -45,7 +46,8 @@ pub struct Args {
     /// Cameras by name, with commas between; left out: all of the scene's
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     cameras: Vec<String>,
-    /// Knobs to move, with commas between; left out: all that have values to try
+    /// Knobs to move, with commas between, such as `samples` or, with values that are tried around balanced only,
+    /// `samples=1/4`; left out: all that have values to try
     #[arg(long, value_name = "KNOB,…", value_delimiter = ',')]
     knobs: Vec<String>,
     /// Set one knob in all presets; repeatable

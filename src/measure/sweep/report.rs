@@ -12,7 +12,7 @@ use super::result::{CameraError, Point, SweepResult};
 use super::run::picture_file;
 use crate::Result;
 use crate::measure::metrics::{Difference, Estimate};
-use crate::settings::{KNOBS, PRESETS};
+use crate::settings::{KNOBS, Knob, PRESETS};
 
 /// Columns of [`csv()`].
 pub const CSV_COLUMNS: [&str; 24] = [
@@ -220,7 +220,8 @@ pub fn html(result: &SweepResult, pictures: &Path) -> Result<String> {
     page += &table(HEADINGS, on_front.iter().map(|r| cells(result, r)));
     page +=
         "<h2>Knobs</h2>\n<p>Each knob moved from each preset; joined are the values from one preset.</p>\n";
-    for knob in KNOBS.iter().filter(|k| result.identity.knobs.iter().any(|n| n == k.name)) {
+    let is_swept = |k: &&Knob| result.identity.knobs.iter().any(|n| n.split('=').next() == Some(k.name));
+    for knob in KNOBS.iter().filter(is_swept) {
         let tried: Vec<Vec<Tried>> = PRESETS
             .iter()
             .map(|p| values_of(result, &judged, p, knob.name))
