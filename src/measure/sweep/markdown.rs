@@ -7,6 +7,9 @@ use super::result::SweepResult;
 use crate::measure::metrics::{AVERAGED, RadianceError};
 use crate::settings::PRESETS;
 
+/// What stands in a preset's column.
+type Cell<'a> = dyn Fn(&Row) -> String + 'a;
+
 /// The presets that were measured, with every metric, then those of BN12's choices that were.
 pub fn markdown(result: &SweepResult) -> String {
     let judged = judge(result);
@@ -29,7 +32,7 @@ pub fn markdown(result: &SweepResult) -> String {
     };
     let seen = |value: Option<f64>| value.map_or("–".into(), |v| format!("{v:.3}"));
     let squares = format!("RMSE of means of {AVERAGED} × {AVERAGED} pixels");
-    let lines: [(&str, &dyn Fn(&Row) -> String); 9] = [
+    let lines: [(&str, &Cell); 8] = [
         (quantity, &|r| format!("{:.0} ms", r.ms)),
         (&format!("over {HOME}'s (95 % interval)"), &|r| known(r.ratio, 1.0, 2)),
         ("MiB planned / allocated", &|r| {
@@ -41,10 +44,6 @@ pub fn markdown(result: &SweepResult) -> String {
         ("bias", &|r| radiance(r, |e| e.bias.value, false)),
         ("FLIP", &|r| seen(mean(&result.points[r.point], |e| Some(shown(e).flip?.value)))),
         ("structural similarity", &|r| seen(mean(&result.points[r.point], |e| Some(shown(e).ssim?.value)))),
-        ("popping, beyond the most accurate setting's", &|r| {
-            let popping = mean(&result.points[r.point], |e| Some(e.popping?.value));
-            popping.map_or("–".into(), |v| format!("{:.1} %", 100.0 * v))
-        }),
     ];
     for (what, cell) in lines {
         let cells: Vec<String> = rows.iter().map(|r| cell(r)).collect();
