@@ -3,6 +3,7 @@
 use canopy::measure::path::CameraPath;
 use canopy::measure::report::markdown;
 use canopy::measure::results::BenchResult;
+use canopy::measure::sweep::{self, SweepResult};
 use canopy::settings::KNOBS;
 
 #[test]
@@ -18,14 +19,32 @@ fn the_table_of_knobs_is_that_of_the_settings() {
     assert!(readme.contains(&table), "README.md must hold this table:\n\n{table}");
 }
 
-#[test]
-fn the_table_of_costs_is_that_of_the_results() {
+/// Files of `benches/results` that are sweeps, or benches.
+fn results(sweeps: bool) -> Vec<std::path::PathBuf> {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/results");
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    let is_sweep = |f: &std::path::PathBuf| f.file_name().unwrap().to_str().unwrap().starts_with("sweep-");
+    files.retain(|f| is_sweep(f) == sweeps);
     files.sort();
-    let results: Vec<BenchResult> = files.iter().map(|f| BenchResult::load(f).unwrap()).collect();
+    files
+}
+
+#[test]
+fn the_table_of_costs_is_that_of_the_results() {
+    let results: Vec<BenchResult> = results(false).iter().map(|f| BenchResult::load(f).unwrap()).collect();
     let table = markdown(&results);
     assert!(include_str!("../README.md").contains(&table), "README.md must hold this table:\n\n{table}");
+}
+
+#[test]
+fn the_tables_of_sweeps_are_those_of_the_results() {
+    for file in results(true) {
+        let tables = sweep::markdown::markdown(&SweepResult::load(&file).unwrap());
+        for table in tables.split("\n\n") {
+            let found = include_str!("../README.md").contains(table.trim_end());
+            assert!(found, "README.md must hold this table of {}:\n\n{table}", file.display());
+        }
+    }
 }
 
 #[test]

@@ -57,10 +57,11 @@ fn done(folder: &Path, args: &[&str]) -> Output {
     out
 }
 
-/// One knob, which changes the images.
+/// One knob, which changes the images, against the most accurate setting.
 fn sweep(folder: &Path, out: &str, more: &[&str]) -> Output {
     let knobs = ["sweep", "small.toml", "--size", SIZE, "--knobs", "samples", "--rounds", "2"];
-    program(folder, &[&knobs[..], &["--product", "1", "--quiet", "-o", out], more].concat())
+    let against = ["--reference", "none"];
+    program(folder, &[&knobs[..], &against, &["--product", "1", "--quiet", "-o", out], more].concat())
 }
 
 fn result(folder: &Path, out: &str) -> Value {
@@ -210,6 +211,46 @@ fn render_within_a_budget(at: &Path) {
 }
 
 #[test]
+fn a_sweep_traces_its_reference_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let swept = |out: &str, more: &[&str]| {
+        let args =
+            ["sweep", "small.toml", "--size", "24x16", "--knobs", "samples", "--rounds", "2", "--quiet"];
+        program(at, &[&args[..], &["--reference-until", "4spp", "-o", out], more].concat())
+    };
+    let ok = |out: Output| assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    // Traced even where no time is left for settings.
+    ok(swept("a", &["--budget", "0s"]));
+    let image = |out: &str| std::fs::read(at.join(out).join("near.exr")).unwrap();
+    let written = || std::fs::metadata(at.join("a/near.exr")).unwrap().modified().unwrap();
+    let before = (image("a"), written());
+    // Its errors are against the reference, and going on takes that which is there.
+    ok(swept("a", &["--shard", "1/7"]));
+    assert!(before == (image("a"), written()));
+    let points = result(at, "a")["points"].as_array().unwrap().clone();
+    let error = &points[0]["errors"][0]["against_reference"];
+    assert!(points[0]["name"] == "balanced" && error["foreground"]["rmse"]["value"].as_f64().unwrap() > 0.0);
+    assert!(error["reference_noise"].as_f64().unwrap() > 0.0, "{error}");
+    // The same anywhere, so that shards join.
+    ok(swept("b", &["--budget", "0s"]));
+    assert_eq!(image("a"), image("b"));
+    ok(swept("c", &["--budget", "0s", "--from", "a"]));
+    assert!(image("c") == image("a") && result(at, "c")["points"] == result(at, "a")["points"]);
+    // Another goal, and an image that was changed, are not taken for it.
+    for (out, more, hint) in [
+        ("a", &["--bounces", "2"][..], "reference of something else"),
+        ("a", &["--reference", "near.exr"], "cannot be used with"),
+    ] {
+        let out = swept(out, more);
+        let text = String::from_utf8_lossy(&out.stderr);
+        assert!(out.status.code() == Some(2) && text.contains(hint), "{more:?}: {text}");
+    }
+    done(at, &["render", "small.toml", "--size", "24x16", "--quiet", "-o", "x.png", "--exr", "b/near.exr"]);
+    assert_eq!(swept("b", &["--budget", "0s"]).status.code(), Some(2));
+}
+
+#[test]
 fn differences_of_images_are_told() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
@@ -233,6 +274,7 @@ fn differences_of_images_are_told() {
     let keys: Vec<&str> = other.as_object().unwrap().keys().map(String::as_str).collect();
     let expected = [
         "actual",
+        "averaged",
         "command",
         "distance_spread",
         "exposure",

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use canopy::image::Layers;
-use canopy::measure::metrics::{Difference, Estimate, difference, display, flip, key_exposure};
+use canopy::measure::metrics::{AVERAGED, Difference, Estimate, difference, display, flip, key_exposure};
 use canopy::{Error, Result};
 
 use super::SCHEMA_VERSION;
@@ -105,7 +105,8 @@ fn text(r: &Report) -> String {
     let mut errors =
         Table::new(1, &["radiance, %", "RMSE", "95 % interval", "bias", "95 % interval", "pixels"]);
     let named = |region| format!("{region:?}").to_lowercase();
-    let whole = [("image", &d.image), ("foreground", &d.foreground)];
+    let squares = format!("foreground, means of {AVERAGED} x {AVERAGED} pixels");
+    let whole = [("image", &d.image), ("foreground", &d.foreground), (&squares, &d.averaged)];
     let rows = whole.into_iter().filter_map(|(name, e)| Some((name.to_string(), e.as_ref()?)));
     for (name, e) in rows.chain(d.regions.iter().map(|(region, e)| (named(region), e))) {
         let ([rmse, rmse_interval], [bias, bias_interval]) =

@@ -178,13 +178,14 @@ impl ReferenceOptions {
 
 /// A goal as users write it.
 #[derive(Clone, Copy, Debug)]
-pub struct Goal(Until);
+pub struct Goal(pub Until);
 
 /// A number of bounces as users write it.
 #[derive(Clone, Copy, Debug)]
-pub struct Bounces(Option<u32>);
+pub struct Bounces(pub Option<u32>);
 
-fn goal(text: &str) -> std::result::Result<Goal, String> {
+/// "1%", "16spp", "60s".
+pub fn goal(text: &str) -> std::result::Result<Goal, String> {
     let form = || "write an error such as 1%, samples such as 16spp, or a time such as 60s".to_string();
     let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(form);
     if let Some(percent) = text.strip_suffix('%') {
@@ -207,7 +208,8 @@ fn goal(text: &str) -> std::result::Result<Goal, String> {
     }
 }
 
-fn bounces(text: &str) -> std::result::Result<Bounces, String> {
+/// "1", "full".
+pub fn bounces(text: &str) -> std::result::Result<Bounces, String> {
     match (text, text.parse::<u32>()) {
         ("full", _) => Ok(Bounces(None)),
         (_, Ok(n @ 1..)) => Ok(Bounces(Some(n))),

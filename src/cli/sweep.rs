@@ -8,13 +8,15 @@ use canopy::bake::cache;
 use canopy::image::Layers;
 use canopy::measure::sweep::design::knobs;
 use canopy::measure::sweep::judge::judge;
+use canopy::measure::sweep::markdown::markdown;
 use canopy::measure::sweep::run::{PICTURES, Request, sweep};
-use canopy::measure::sweep::{SweepResult, kept, report};
+use canopy::measure::sweep::{SweepResult, kept, report, truth};
+use canopy::reference;
 use canopy::scene::Camera;
 use canopy::settings::{KNOBS, PRESETS};
 use canopy::{Error, Result};
 
-use super::options::{self, DeviceOptions, PrintOptions};
+use super::options::{self, Bounces, DeviceOptions, Goal, PrintOptions};
 use super::output::{self, Table};
 
 const EXAMPLES: &str = "\
@@ -22,10 +24,15 @@ Examples:
   canopy sweep -o sweep                               the built-in scene: sweep/report.html, sweep.csv, sweep.json
   canopy sweep my.toml -o s --size 640x480 --budget 2h --cameras ridge-line,near
   canopy sweep -o s --knobs samples,view_iterations   these knobs only
+  canopy sweep -o s --knobs view_rings=4/6/9 --product 0  these values only, around balanced
   canopy sweep -o s --reference truth/                errors against truth/CAMERA.exr, with a layer `variance` if it is noisy
+  canopy sweep -o s --reference none                  errors against the most accurate setting only
+  canopy sweep -o s --reference-until 1% --bounces full   a better reference, with light of all orders
   canopy sweep -o s                                   again: goes on where it stopped
   canopy sweep -o s1 --shard 1/2; canopy sweep -o s2 --shard 2/2; canopy sweep -o s --from s1 --from s2
   canopy render --budget 50ms --sweep s/sweep.json    the most accurate setting that holds 50 ms there
+Errors are against a path-traced reference, which is traced first if none is given (outside --budget; a few minutes) and kept as
+CAMERA.exr beside the result, for going on and, through --from, for shards. Its noise is taken out of every error.
 Order of work: presets, the knobs of balanced, those of fast and accurate, then a product of the knobs that matter most.";
 
 #[derive(clap::Args)]
@@ -39,15 +46,23 @@ pub struct Args {
     /// Cameras by name, with commas between; left out: all of the scene's
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     cameras: Vec<String>,
-    /// Knobs to move, with commas between; left out: all that have values to try
+    /// Knobs to move, with commas between, such as `samples` or, with values that are tried around balanced only,
+    /// `samples=1/4`; left out: all that have values to try
     #[arg(long, value_name = "KNOB,…", value_delimiter = ',')]
     knobs: Vec<String>,
     /// Set one knob in all presets; repeatable
     #[arg(long, value_name = "KNOB=VALUE", value_parser = options::assignment)]
     set: Vec<(String, f64)>,
-    /// Linear image to hold errors against, or a folder with CAMERA.exr for each camera
-    #[arg(long, value_name = "FILE.exr|DIR")]
+    /// Linear image to hold errors against, a folder with CAMERA.exr for each camera, or none; left out: traced first
+    #[arg(long, value_name = "FILE.exr|DIR|none")]
     reference: Option<PathBuf>,
+    /// When the reference that is traced is good enough: an error of a pixel such as 2%, samples a pixel such as 64spp, or a
+    /// time a camera such as 60s (shards then trace different ones)
+    #[arg(long, value_name = "2%|64spp|60s", default_value = "2%", value_parser = options::goal, conflicts_with = "reference")]
+    reference_until: Goal,
+    /// Surfaces that light may meet on its way in that reference: 1 is what the renderer models, full any number
+    #[arg(long, value_name = "1|N|full", default_value = "1", value_parser = options::bounces, conflicts_with = "reference")]
+    bounces: Bounces,
     /// Frames of each camera and setting; the first only warms up
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(2..=10_000))]
     rounds: u32,
@@ -66,6 +81,9 @@ pub struct Args {
     /// Folder for sweep.json, sweep.csv, report.html and pictures; a result in it is gone on with
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    /// Print Markdown tables of the presets and of BN12's choices
+    #[arg(long, conflicts_with = "json")]
+    markdown: bool,
     #[command(flatten)]
     device: DeviceOptions,
     #[command(flatten)]
@@ -84,12 +102,13 @@ pub fn run(args: &Args) -> Result<()> {
         [] => scene.cameras.clone(),
         names => names.iter().map(|n| scene.camera(Some(n)).cloned()).collect::<Result<_>>()?,
     };
-    let references = match &args.reference {
-        Some(path) => references(path, &cameras, args.size)?,
-        None => Vec::new(),
+    let given = match &args.reference {
+        Some(path) if path.as_os_str() == "none" => Some(Vec::new()),
+        Some(path) => Some(references(path, &cameras, args.size)?),
+        None => None,
     };
     std::fs::create_dir_all(&args.output).map_err(|e| Error::io(&args.output, e))?;
-    let request = Request {
+    let mut request = Request {
         scene,
         cameras,
         size: args.size,
@@ -99,12 +118,18 @@ pub fn run(args: &Args) -> Result<()> {
         budget: args.budget.unwrap_or(Duration::MAX),
         shard: args.shard.unwrap_or((1, 1)),
         product: args.product.into(),
-        references,
+        references: Vec::new(),
         cache: cache::default_dir(),
         validate: args.device.validate,
         quiet: args.print.quiet,
     };
-    let result = args.device.with(|gpu| sweep(gpu, &request, &args.output, &args.from))?;
+    let result = args.device.with(|gpu| {
+        request.references = match given {
+            Some(references) => references,
+            None => trace(args, &request)?,
+        };
+        sweep(gpu, &request, &args.output, &args.from)
+    })?;
     if let Some(file) = cache::default_dir().and_then(|dir| kept::file(&dir, &result.identity).ok()) {
         kept::keep(&file, &result)?;
     }
@@ -113,6 +138,8 @@ pub fn run(args: &Args) -> Result<()> {
     write("report.html", &report::html(&result, &args.output.join(PICTURES))?)?;
     if args.print.json {
         output::json(&result)
+    } else if args.markdown {
+        output::print(&markdown(&result))
     } else if args.print.quiet {
         Ok(())
     } else {
@@ -120,10 +147,27 @@ pub fn run(args: &Args) -> Result<()> {
     }
 }
 
+/// The reference of each camera, path-traced or as it was kept.
+fn trace(args: &Args, request: &Request) -> Result<Vec<(Layers, String)>> {
+    let options = reference::Options {
+        bounces: args.bounces.0,
+        until: args.reference_until.0,
+        ..reference::Options::default()
+    };
+    let truth = truth::Request {
+        scene: &request.scene,
+        cameras: &request.cameras,
+        size: request.size,
+        options,
+        quiet: request.quiet,
+    };
+    truth::references(&truth, &args.output, &args.from)
+}
+
 /// The reference of each camera: the file itself for one, else CAMERA.exr in a folder.
 fn references(path: &std::path::Path, cameras: &[Camera], size: [u32; 2]) -> Result<Vec<(Layers, String)>> {
     let file = |c: &Camera| match path.is_dir() {
-        true => path.join(format!("{}.exr", c.name)),
+        true => truth::image_file(path, c),
         false => path.to_path_buf(),
     };
     if !path.is_dir() && cameras.len() > 1 {
@@ -135,7 +179,7 @@ fn references(path: &std::path::Path, cameras: &[Camera], size: [u32; 2]) -> Res
     }
     let read = |c: &Camera| {
         let file = file(c);
-        let layers = Layers::read(&file)?;
+        let (layers, hash) = truth::read(&file)?;
         if layers.size != size {
             let [w, h] = layers.size;
             let remedy = format!("sweep with --size {w}x{h}");
@@ -146,8 +190,7 @@ fn references(path: &std::path::Path, cameras: &[Camera], size: [u32; 2]) -> Res
                 remedy,
             ));
         }
-        let bytes = std::fs::read(&file).map_err(|e| Error::io(&file, e))?;
-        Ok((layers, canopy::files::digest(&bytes)))
+        Ok((layers, hash))
     };
     cameras.iter().map(read).collect()
 }

@@ -35,8 +35,47 @@ impl Layers {
             radiance: l.radiance(),
             depth: l.depth.clone(),
             fractions: l.fractions.clone(),
-            variance: None,
+            variance: l.noise.as_ref().map(|n| n.variance.clone()),
         })
+    }
+
+    /// The means over squares of `side` pixels; those at the right and lower edges may be cut. Depth is the mean where something
+    /// is.
+    pub fn averaged(&self, side: u32) -> Self {
+        let size = self.size.map(|s| s.div_ceil(side));
+        let pixels = |k: u32| {
+            let [x, y] = [k % size[0], k / size[0]].map(|v| v * side);
+            let end = |from: u32, n: u32| (from + side).min(n);
+            let rows = y..end(y, self.size[1]);
+            rows.flat_map(move |v| (x..end(x, self.size[0])).map(move |u| (v * self.size[0] + u) as usize))
+        };
+        fn mean<const N: usize>(all: &[[f32; N]], pixels: impl Iterator<Item = usize>) -> ([f32; N], f64) {
+            let (mut sum, mut count) = ([0.0; N], 0.0);
+            for k in pixels {
+                sum.iter_mut().zip(all[k]).for_each(|(s, v)| *s += f64::from(v));
+                count += 1.0;
+            }
+            (sum.map(|s| (s / f64::max(count, 1.0)) as f32), count)
+        }
+        let depth: Vec<[f32; 1]> = self.depth.iter().map(|d| [*d]).collect();
+        let all = 0..size[0] * size[1];
+        Layers {
+            size,
+            radiance: all.clone().map(|k| mean(&self.radiance, pixels(k)).0).collect(),
+            depth: all
+                .clone()
+                .map(|k| mean(&depth, pixels(k).filter(|p| self.depth[*p] > 0.0)).0[0])
+                .collect(),
+            fractions: all.clone().map(|k| mean(&self.fractions, pixels(k)).0).collect(),
+            // Pixels are independent: the variance of their mean is the mean of their variances over their number.
+            variance: self.variance.as_ref().map(|variance| {
+                let of = |k| {
+                    let (mean, count) = mean(variance, pixels(k));
+                    mean.map(|v| v / count as f32)
+                };
+                all.map(of).collect()
+            }),
+        }
     }
 
     /// Reads the layers `radiance`, `depth` and `fractions` of an EXR, and `variance` if it has that.
@@ -101,7 +140,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::image::Linear;
+    use crate::image::{Linear, Noise};
 
     #[test]
     fn what_a_picture_writes_is_read_again() {
@@ -115,11 +154,32 @@ mod tests {
             coverage: vec![0.0; 6],
             species: vec![0; 6],
             fractions: (0..6).map(|k| [0.0, 0.25, 0.5, value(k)]).collect(),
-            noise: None,
+            noise: Some(Noise { variance: (0..6).map(|k| [value(k); 3]).collect(), samples: vec![4; 6] }),
         };
         let picture = Picture { size: [3, 2], display: vec![0; 24], linear: Some(linear) };
         picture.write_exr(&path).unwrap();
         assert_eq!(Layers::read(&path).unwrap(), Layers::of(&picture).unwrap());
+    }
+
+    #[test]
+    fn squares_of_pixels_have_their_means() {
+        let each = |of: fn(usize) -> f32| (0..6).map(|k| [of(k); 3]).collect::<Vec<_>>();
+        let image = Layers {
+            size: [3, 2],
+            radiance: each(|k| k as f32),
+            depth: vec![2.0, 0.0, 3.0, 4.0, 0.0, 0.0],
+            fractions: (0..6).map(|k| [k as f32, 0.0, 0.0, 1.0]).collect(),
+            variance: Some(each(|k| 1.0 + k as f32)),
+        };
+        let half = image.averaged(2);
+        // Pixels 0, 1, 3, 4, and what is left of the square at the edge: 2 and 5.
+        assert_eq!((half.size, half.radiance), ([2, 1], vec![[2.0; 3], [3.5; 3]]));
+        assert_eq!(
+            (half.depth, half.fractions),
+            (vec![3.0, 3.0], vec![[2.0, 0.0, 0.0, 1.0], [3.5, 0.0, 0.0, 1.0]])
+        );
+        assert_eq!(half.variance.unwrap(), [[3.0 / 4.0; 3], [4.5 / 2.0; 3]]);
+        assert_eq!(image.averaged(1), image);
     }
 
     /// Writes layers of floats as `(name, [(channel, value)])`.

@@ -125,6 +125,15 @@ impl Key {
         key
     }
 
+    /// BLAKE3 of all parts, in hexadecimal.
+    pub fn digest(&self) -> String {
+        let mut all = blake3::Hasher::new();
+        for (name, hash) in &self.parts {
+            all.update(name.as_bytes()).update(b"\0").update(hash.as_bytes());
+        }
+        all.finalize().to_hex().to_string()
+    }
+
     /// Names of the parts that differ.
     pub fn differences(&self, other: &Key) -> Vec<String> {
         let lacks = |a: &Key, part: &(String, String)| !a.parts.contains(part);

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::estimate::{Estimate, Sums};
 use super::hierarchy::Stack;
+use super::key::Key;
 use super::sampling::Random;
 use super::world::World;
 use super::{Options, Until};
@@ -47,7 +48,7 @@ impl World {
         progress: &mut dyn FnMut(Progress<'_>),
     ) -> Result<Estimate> {
         options.check()?;
-        let key = self.key.with(eye, options);
+        let key = self.key(eye, options);
         let mut estimate = match resume {
             Some(old) => {
                 old.check_same(&key)?;
@@ -62,6 +63,11 @@ impl World {
             progress(Progress { estimate: &estimate, done, rays, elapsed: start.elapsed() });
         }
         Ok(estimate)
+    }
+
+    /// What every sample of such an image depends on; not when it is good enough.
+    pub fn key(&self, eye: &Eye, options: &Options) -> Key {
+        self.key.with(eye, options)
     }
 
     /// Adds samples up to so many a pixel; returns the number of rays.

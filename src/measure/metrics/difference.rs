@@ -9,6 +9,9 @@ use super::{
 use crate::image::Layers;
 use crate::{Error, Result};
 
+/// Side of the squares of [`Difference::averaged`], pixels.
+pub const AVERAGED: u32 = 4;
+
 /// How far an image is from its reference.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Difference {
@@ -20,7 +23,9 @@ pub struct Difference {
     pub image: Option<RadianceError>,
     /// The same without the background, which is right at any setting and may be brighter than all else.
     pub foreground: Option<RadianceError>,
-    /// The same by region of the reference; regions that do not exist are left out.
+    /// That of the mean radiance of squares of [`AVERAGED`]² pixels: what is left where single leaves do not count.
+    pub averaged: Option<RadianceError>,
+    /// That of single pixels by region of the reference; regions that do not exist are left out.
     pub regions: BTreeMap<Region, RadianceError>,
     /// Mean FLIP of the pictures as displayed.
     pub flip: Option<Estimate>,
@@ -50,11 +55,14 @@ pub fn difference(actual: &Layers, reference: &Layers, exposure: f64) -> Result<
     let parts = [Region::Trees, Region::Ground, Region::Silhouettes, Region::Background];
     let of = |region| Some((region, radiance_error(actual, reference, |k| all[k] == region)?));
     let bins = over_distance(actual, reference);
+    let squares = [actual, reference].map(|l| l.averaged(AVERAGED));
+    let parts_of_squares = regions(&squares[1]);
     Ok(Difference {
         not_finite: not_finite as u64,
         reference_noise: relative_noise(reference),
         image: radiance_error(actual, reference, |_| true),
         foreground: radiance_error(actual, reference, |k| all[k] != Region::Background),
+        averaged: radiance_error(&squares[0], &squares[1], |k| parts_of_squares[k] != Region::Background),
         regions: parts.into_iter().filter_map(of).collect(),
         flip: flip_error(actual, reference, exposure),
         ssim: structural(actual, reference, exposure),
@@ -73,6 +81,8 @@ mod tests {
         let a = texture([60, 40], 1);
         let d = difference(&mapped(&a, |v| 1.2 * v), &a, 1.0).unwrap();
         let pixels: u64 = d.regions.values().map(|r| r.pixels).sum();
+        let averaged = d.averaged.unwrap();
+        assert!((averaged.bias.value - 0.2).abs() < 1e-6 && averaged.pixels < 2400 / 16, "{averaged:?}");
         assert_eq!((pixels, d.regions.len(), d.not_finite), (2400, 4, 0));
         assert!(d.regions.values().all(|r| (r.bias.value - 0.2).abs() < 1e-6), "{d:?}");
         assert!(d.distance_spread.unwrap() < 1e-6 && d.flip.unwrap().value > 0.0);

@@ -23,7 +23,7 @@ mod radiance;
 mod region;
 mod ssim;
 
-pub use difference::{Difference, difference};
+pub use difference::{AVERAGED, Difference, difference};
 pub use distance::{DistanceBin, over_distance, spread};
 pub use estimate::{Estimate, block_sums, estimate};
 pub use motion::popping;

@@ -35,21 +35,65 @@ pub struct Setting {
     pub settings: Settings,
 }
 
-/// The knobs of a sweep: all that have values to try, or those named.
+/// A knob that is swept.
+#[derive(Clone, Debug)]
+pub struct Swept {
+    /// The knob.
+    pub knob: &'static Knob,
+    /// Its values around [`HOME`], and of no other preset; empty: those to try around every preset.
+    pub values: Vec<f64>,
+}
+
+impl Swept {
+    /// The values to move to from a preset's.
+    fn around(&self, preset: &str, value: f64) -> Vec<f64> {
+        match &self.values[..] {
+            [] => self.knob.around(value),
+            values if preset == HOME => values.iter().copied().filter(|v| *v != value).collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The most accurate of its values and that of the preset `accurate`: the one that the knob tries last.
+    fn most_accurate(&self, preset: f64) -> f64 {
+        let order = |v: f64| self.knob.tries.iter().position(|t| *t == v);
+        let all = if self.values.is_empty() { self.knob.tries } else { &self.values };
+        all.iter().copied().fold(preset, |best, v| if order(v) > order(best) { v } else { best })
+    }
+
+    /// The name, and the values that were named.
+    pub fn label(&self) -> String {
+        let values: Vec<String> = self.values.iter().map(f64::to_string).collect();
+        if values.is_empty() {
+            self.knob.name.into()
+        } else {
+            format!("{}={}", self.knob.name, values.join("/"))
+        }
+    }
+}
+
+/// The knobs of a sweep: all that have values to try, or those named, as `samples` or with values as `samples=1/4`.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name that is no such knob.
-pub fn knobs(named: &[String]) -> Result<Vec<&'static Knob>> {
+/// [`Error::Usage`] for a name that is no such knob, and for a value that is no number.
+pub fn knobs(named: &[String]) -> Result<Vec<Swept>> {
     if named.is_empty() {
-        return Ok(KNOBS.iter().filter(|k| !k.tries.is_empty()).collect());
+        let all = KNOBS.iter().filter(|k| !k.tries.is_empty());
+        return Ok(all.map(|knob| Swept { knob, values: Vec::new() }).collect());
     }
-    let find = |name: &String| {
+    let find = |text: &String| {
+        let (name, values) = text.split_once('=').unwrap_or((text, ""));
         // A knob that exists, or the settings' own message.
-        let Some(knob) = KNOBS.iter().find(|k| k.name == *name) else {
-            return Err(Settings::default().set(name, 0.0).err().unwrap_or(Error::Usage(name.clone())));
+        let Some(knob) = KNOBS.iter().find(|k| k.name == name) else {
+            return Err(Settings::default().set(name, 0.0).err().unwrap_or(Error::Usage(name.into())));
         };
+        let number = |v: &str| {
+            v.parse().map_err(|_| Error::Usage(format!("\"{text}\": write KNOB, or KNOB=VALUE/VALUE")))
+        };
+        let values: Vec<f64> =
+            values.split('/').filter(|v| !v.is_empty()).map(number).collect::<Result<_>>()?;
         let fixed = Error::Usage(format!("knob \"{name}\" is no choice between time and accuracy"));
-        if knob.tries.is_empty() { Err(fixed) } else { Ok(knob) }
+        if knob.tries.is_empty() { Err(fixed) } else { Ok(Swept { knob, values }) }
     };
     named.iter().map(find).collect()
 }
@@ -59,7 +103,7 @@ pub fn knobs(named: &[String]) -> Result<Vec<&'static Knob>> {
 ///
 /// # Errors
 /// [`Error::Usage`] for a value that no knob takes.
-pub fn one_at_a_time(bases: &BTreeMap<String, Settings>, knobs: &[&Knob]) -> Result<Vec<Setting>> {
+pub fn one_at_a_time(bases: &BTreeMap<String, Settings>, knobs: &[Swept]) -> Result<Vec<Setting>> {
     let mut order = vec![HOME];
     order.extend(PRESETS.iter().filter(|p| **p != HOME));
     let mut all: Vec<Setting> = Vec::new();
@@ -70,9 +114,10 @@ pub fn one_at_a_time(bases: &BTreeMap<String, Settings>, knobs: &[&Knob]) -> Res
     }
     for name in order.iter().filter(|n| bases.contains_key(**n)) {
         let base = &bases[*name];
-        for knob in knobs {
-            for value in knob.around(base.get(knob.name).unwrap_or(f64::NAN)) {
-                let setting = moved(name, base, &[(knob.name, value)], Group::Knob)?;
+        for swept in knobs {
+            let knob = swept.knob.name;
+            for value in swept.around(name, base.get(knob).unwrap_or(f64::NAN)) {
+                let setting = moved(name, base, &[(knob, value)], Group::Knob)?;
                 if all.iter().all(|s| s.settings != setting.settings) {
                     all.push(setting);
                 }
@@ -86,13 +131,14 @@ pub fn one_at_a_time(bases: &BTreeMap<String, Settings>, knobs: &[&Knob]) -> Res
 ///
 /// # Errors
 /// [`Error::Usage`] for a value that no knob takes.
-pub fn product(home: &Settings, knobs: &[&Knob], done: &[Setting]) -> Result<Vec<Setting>> {
+pub fn product(home: &Settings, knobs: &[Swept], done: &[Setting]) -> Result<Vec<Setting>> {
     let mut moves: Vec<Vec<(&str, f64)>> = vec![Vec::new()];
-    for knob in knobs {
-        let values = knob.around(home.get(knob.name).unwrap_or(f64::NAN));
+    for swept in knobs {
+        let knob = swept.knob.name;
+        let values = swept.around(HOME, home.get(knob).unwrap_or(f64::NAN));
         let with = |m: &Vec<(&'static str, f64)>, v: f64| {
             let mut m = m.clone();
-            m.push((knob.name, v));
+            m.push((knob, v));
             m
         };
         moves = moves
@@ -127,18 +173,17 @@ fn moved(base: &str, settings: &Settings, moves: &[(&str, f64)], group: Group) -
     Ok(setting)
 }
 
-/// The most accurate setting: the preset `accurate`, with every knob that is swept at the last of its values to try.
+/// The most accurate setting: the preset `accurate`, with every knob that is swept at the most accurate of its values.
 ///
 /// # Errors
 /// [`Error::Usage`] without that preset.
-pub fn most_accurate(bases: &BTreeMap<String, Settings>, knobs: &[&Knob]) -> Result<Settings> {
+pub fn most_accurate(bases: &BTreeMap<String, Settings>, knobs: &[Swept]) -> Result<Settings> {
     let preset = PRESETS[2];
     let base = bases.get(preset).ok_or_else(|| Error::Usage(format!("no preset \"{preset}\"")))?;
     let mut settings = base.clone();
-    for knob in knobs {
-        if let Some(last) = knob.tries.last() {
-            settings.set(knob.name, *last)?;
-        }
+    for swept in knobs {
+        let knob = swept.knob.name;
+        settings.set(knob, swept.most_accurate(base.get(knob).unwrap_or(f64::NAN)))?;
     }
     Ok(settings)
 }
@@ -151,7 +196,7 @@ mod tests {
         PRESETS.iter().map(|p| (p.to_string(), Settings::preset(p).unwrap())).collect()
     }
 
-    fn some(names: &[&str]) -> Vec<&'static Knob> {
+    fn some(names: &[&str]) -> Vec<Swept> {
         knobs(&names.iter().map(|n| n.to_string()).collect::<Vec<_>>()).unwrap()
     }
 
@@ -195,6 +240,20 @@ mod tests {
         let names: Vec<&str> = new.iter().map(|s| s.name.as_str()).collect();
         assert_eq!(names, ["balanced cascades=3 view_iterations=1", "balanced cascades=3 view_iterations=3"]);
         assert_eq!(most_accurate(&bases(), &two).unwrap().view_iterations, 4);
+    }
+
+    #[test]
+    fn named_values_are_those_around_home() {
+        let two = some(&["view_rings=4/6/9", "samples=1/4"]);
+        let names = |s: &Setting| s.name.clone();
+        let all: Vec<String> = one_at_a_time(&bases(), &two).unwrap().iter().map(names).collect();
+        let moved = ["balanced view_rings=4", "balanced view_rings=6", "balanced samples=1"];
+        assert_eq!(all, [&["balanced", "fast", "accurate"][..], &moved].concat());
+        // The preset `accurate` has more samples.
+        let finest = most_accurate(&bases(), &two).unwrap();
+        assert_eq!((finest.view_rings, finest.samples), (9, 8));
+        assert_eq!([two[0].label(), some(&["samples"])[0].label()], ["view_rings=4/6/9", "samples"]);
+        assert!(knobs(&["samples=few".into()]).is_err());
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::result::{CameraError, Point, SweepResult};
 use super::run::picture_file;
 use crate::Result;
 use crate::measure::metrics::{Difference, Estimate};
-use crate::settings::{KNOBS, PRESETS};
+use crate::settings::{KNOBS, Knob, PRESETS};
 
 /// Columns of [`csv()`].
 pub const CSV_COLUMNS: [&str; 24] = [
@@ -43,17 +43,17 @@ pub const CSV_COLUMNS: [&str; 24] = [
 ];
 
 /// Mean over the cameras that have it; `None` if none has.
-fn mean(point: &Point, of: impl Fn(&CameraError) -> Option<f64>) -> Option<f64> {
+pub(super) fn mean(point: &Point, of: impl Fn(&CameraError) -> Option<f64>) -> Option<f64> {
     let all: Vec<f64> = point.errors.iter().filter_map(of).collect();
     (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
 }
 
 /// What errors are judged by.
-fn shown(e: &CameraError) -> &Difference {
+pub(super) fn shown(e: &CameraError) -> &Difference {
     e.against_reference.as_ref().unwrap_or(&e.against_most_accurate)
 }
 
-fn against(judged: &Judged) -> &'static str {
+pub(super) fn against(judged: &Judged) -> &'static str {
     if judged.against_reference { "reference" } else { "most accurate setting" }
 }
 
@@ -90,7 +90,7 @@ pub fn csv(result: &SweepResult) -> String {
 }
 
 /// A value with its interval, in parts of 1 or per cent.
-fn known(e: Estimate, factor: f64, digits: usize) -> String {
+pub(super) fn known(e: Estimate, factor: f64, digits: usize) -> String {
     let number = |v: f64| format!("{:.digits$}", factor * v);
     let interval = e.interval.map_or("?".into(), |[a, b]| format!("{} – {}", number(a), number(b)));
     format!("{} ({interval})", number(e.value))
@@ -220,7 +220,8 @@ pub fn html(result: &SweepResult, pictures: &Path) -> Result<String> {
     page += &table(HEADINGS, on_front.iter().map(|r| cells(result, r)));
     page +=
         "<h2>Knobs</h2>\n<p>Each knob moved from each preset; joined are the values from one preset.</p>\n";
-    for knob in KNOBS.iter().filter(|k| result.identity.knobs.iter().any(|n| n == k.name)) {
+    let is_swept = |k: &&Knob| result.identity.knobs.iter().any(|n| n.split('=').next() == Some(k.name));
+    for knob in KNOBS.iter().filter(is_swept) {
         let tried: Vec<Vec<Tried>> = PRESETS
             .iter()
             .map(|p| values_of(result, &judged, p, knob.name))

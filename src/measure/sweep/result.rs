@@ -47,7 +47,7 @@ pub struct Identity {
     pub presets: BTreeMap<String, Settings>,
     /// The most accurate setting.
     pub most_accurate: Settings,
-    /// Knobs that are swept.
+    /// Knobs that are swept, those with values of their own as `samples=1/4`.
     pub knobs: Vec<String>,
     /// Frames of each camera and setting that are timed, the first of which only warms up.
     pub rounds: u32,

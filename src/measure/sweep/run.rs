@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::design::{HOME, Setting, most_accurate, one_at_a_time, product};
+use super::design::{HOME, Setting, Swept, most_accurate, one_at_a_time, product};
 use super::judge;
 use super::result::{CameraError, Identity, Point, SWEEP_SCHEMA_VERSION, Sample, SweepResult, Time};
 use crate::frame::auto_exposure;
@@ -45,7 +45,7 @@ pub struct Request {
     /// The presets as the scene and the user change them, by name; [`HOME`] among them.
     pub presets: BTreeMap<String, Settings>,
     /// Knobs to move.
-    pub knobs: Vec<&'static Knob>,
+    pub knobs: Vec<Swept>,
     /// Frames of each camera and setting; the first only warms up.
     pub rounds: u32,
     /// No setting is begun after this.
@@ -93,7 +93,9 @@ pub fn sweep(gpu: &Gpu, request: &Request, folder: &Path, from: &[PathBuf]) -> R
             if all.iter().any(|s| result.points.iter().all(|p| p.name != s.name)) {
                 break;
             }
-            let knobs = judge::knobs_that_matter(&result, request.product);
+            let chosen = judge::knobs_that_matter(&result, request.product);
+            let swept = |k: &&Knob| request.knobs.iter().find(|s| s.knob.name == k.name).cloned();
+            let knobs: Vec<Swept> = chosen.iter().filter_map(swept).collect();
             let Some(home) = request.presets.get(HOME) else { break };
             let new = product(home, &knobs, &all)?;
             begun = all.len();
@@ -149,7 +151,7 @@ fn empty(gpu: &Gpu, request: &Request, finest: &Settings) -> Result<SweepResult>
         cameras: request.cameras.iter().map(|c| format!("{c:?}")).collect(),
         presets: request.presets.clone(),
         most_accurate: finest.clone(),
-        knobs: request.knobs.iter().map(|k| k.name.into()).collect(),
+        knobs: request.knobs.iter().map(Swept::label).collect(),
         rounds: request.rounds,
         device: gpu.info().into(),
         cpu: (host.cpu.clone(), host.threads),
