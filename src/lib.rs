@@ -51,7 +51,8 @@
 //! | conformance of a driver | [`measure::conform`] | `probe/*` | `tests/conform.rs`, `tests/conformance/`, `tests/proofs/planted.rs` |
 //! | bakes on disk | [`bake::cache`], [`bake::tables`] | | `tests/cache.rs`, `tests/tables.rs` |
 //! | what a scene requires | [`plan`] | | `tests/gpu/plan.rs` |
-//! | the whole frame: extremes, the same bits again | [`frame`] | `frame/*` | `tests/gpu/extremes.rs`, `tests/gpu/determinism.rs` |
+//! | the whole frame: extremes, paths through them, the same bits again | [`frame`] | `frame/*` | `tests/gpu/extremes.rs`, `tests/gpu/paths.rs`, `tests/gpu/determinism.rs` |
+//! | what few bits cost | | | `tests/proofs/precision.rs` |
 //! | timestamps, statistics of the pipeline, CPU time a pass | [`gpu::Timing`], [`clock`] | | `tests/bench.rs`, `tests/proofs/bench.rs` |
 //! | benches along camera paths | [`measure::bench`], [`measure::path`], [`measure::results`], [`measure::trace`] | | `tests/bench.rs` |
 //! | what differs between two benches | [`measure::compare`], [`measure::statistics`] | | `tests/compare.rs`, `tests/proofs/bench.rs` |
