@@ -356,7 +356,8 @@ fn nothing_jumps_when_quads_split() {
     let n = far.sky.len() as f64;
     let spread = (spread * n / (mean * mean) - 1.0).sqrt();
     println!("brightness varies by about {spread:.3}");
-    assert!(spread > 0.1, "there is nothing to jump");
+    // Ten times what a change may be.
+    assert!(spread > 0.07, "there is nothing to jump");
     // Four centimetres of 787 m move the image's corner by 1/70 pixel, of five to a texel; contrast is at most one of
     // its mean a texel. Half floats: a step of 2^-10 at each of two frames and twice between texels.
     worst.within(1.0 / 70.0 / 5.0 * 2.0 + 4.0 / 1024.0, "change of brightness");
