@@ -10,7 +10,6 @@ use crate::frame::camera::Eye;
 use crate::frame::shader_map;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
-use crate::physics::light::sun_disc_fraction;
 use crate::physics::terrain::height_at;
 use crate::physics::views;
 use crate::scene::{Albedo, Camera, Distribution, Raster, Scene, Sky};
@@ -230,8 +229,7 @@ impl Plan {
         device: Option<&DeviceInfo>,
     ) -> Result<Self> {
         let s = &scene.settings;
-        let has_sun =
-            sun_disc_fraction(scene.sun.elevation) > 0.0 && scene.sun.irradiance.iter().any(|e| *e > 0.0);
+        let has_sun = scene.sun.shines();
         let mut plan = Plan {
             items: Vec::new(),
             representation,

@@ -6,7 +6,7 @@ pub mod file;
 mod occlusion;
 pub(crate) mod optics;
 mod raster;
-mod rays;
+pub(crate) mod rays;
 mod scene;
 mod self_shadow;
 pub(crate) mod surface;

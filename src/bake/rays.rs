@@ -11,10 +11,18 @@ use glam::Vec3;
 
 use super::surface::Surface;
 
-struct Shape {
+/// A box, and its place in the crate's tree.
+pub(crate) struct Shape {
     low: Vec3,
     high: Vec3,
     node: usize,
+}
+
+impl Shape {
+    /// A box by its lowest and highest corner.
+    pub(crate) fn new(low: Vec3, high: Vec3) -> Self {
+        Shape { low, high, node: 0 }
+    }
 }
 
 impl Bounded<f32, 3> for Shape {
@@ -54,10 +62,8 @@ impl<'a> Rays<'a> {
     pub fn new(surface: &'a Surface) -> Self {
         let corners: Vec<[Vec3; 3]> =
             surface.faces.iter().map(|f| f.p.map(|p| surface.frame.to_metres(p))).collect();
-        let mut shapes: Vec<Shape> = corners
-            .iter()
-            .map(|[a, b, c]| Shape { low: a.min(*b).min(*c), high: a.max(*b).max(*c), node: 0 })
-            .collect();
+        let mut shapes: Vec<Shape> =
+            corners.iter().map(|[a, b, c]| Shape::new(a.min(*b).min(*c), a.max(*b).max(*c))).collect();
         // Sequential on purpose: the order of nodes is then the same every time.
         let nodes = Bvh::build(&mut shapes).flatten_custom(&|aabb: &Aabb<f32, 3>, entry, exit, face| Node {
             low: Vec3::new(aabb.min[0], aabb.min[1], aabb.min[2]),

@@ -26,7 +26,6 @@ use crate::forest::terrain::TerrainData;
 use crate::gpu::interface::View;
 use crate::gpu::{Buffer, Gpu, Timing};
 use crate::image::Picture;
-use crate::physics::light::sun_disc_fraction;
 use crate::plan::Plan;
 use crate::scene::{Camera, Scene, Sun};
 use crate::{Error, Result};
@@ -186,8 +185,7 @@ impl Renderer {
     /// # Errors
     /// [`Error::Usage`] when it shines and the plan was made without.
     pub fn set_sun(&mut self, sun: Sun) -> Result<()> {
-        let shines = sun_disc_fraction(sun.elevation) > 0.0 && sun.irradiance.iter().any(|e| *e > 0.0);
-        if self.plan.cascades == 0 && shines {
+        if self.plan.cascades == 0 && sun.shines() {
             return Err(Error::Usage("the plan was made without a sun: plan again for this one".into()));
         }
         Arc::make_mut(&mut self.scene).sun = sun;

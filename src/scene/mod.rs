@@ -15,6 +15,7 @@ pub mod texture;
 
 use std::sync::Arc;
 
+use crate::physics::light::sun_disc_fraction;
 use crate::settings::{Settings, nearest};
 use crate::{Error, Result};
 pub use file::{default_scene, load, load_at, parse};
@@ -162,6 +163,13 @@ pub struct Sun {
     pub elevation: f64,
     /// RGB irradiance on a plane facing the sun.
     pub irradiance: [f32; 3],
+}
+
+impl Sun {
+    /// Whether any of it is above a level horizon, and gives light.
+    pub fn shines(&self) -> bool {
+        sun_disc_fraction(self.elevation) > 0.0 && self.irradiance.iter().any(|e| *e > 0.0)
+    }
 }
 
 /// The sky.
