@@ -70,7 +70,7 @@ fn names_of_the_json_and_csv_stay() {
         assert!(metrics.contains(&name) || name == "pass.seeds.gpu_ms", "{name} is not in {metrics:?}");
     }
     let csv = read("b.csv");
-    let header = "frame,round,view,scope,name,start_ms,gpu_ms,cpu_ms,wall_ms,stream_ms,record_ms,wait_ms,draws,\
+    let header = "setting,frame,round,view,scope,name,start_ms,gpu_ms,cpu_ms,wall_ms,stream_ms,record_ms,wait_ms,draws,\
                   dispatches,trees_zfield,shadow_casters,terrain_quads,tiles_produced,tiles_evicted";
     assert_eq!(csv.lines().next(), Some(header));
     let columns = header.split(',').count();
@@ -102,13 +102,14 @@ fn passes_add_up_follow_their_submission_and_do_not_overlap() {
         }
         let trace: Value =
             serde_json::from_str(&std::fs::read_to_string(dir.path().join("t.json")).unwrap()).unwrap();
-        check_trace(&trace, &result);
+        check_trace(&trace, 1, &result);
     }
 }
 
 /// Complete events; on each thread they nest or are apart (half a microsecond of rounding); the GPU's lie within their frame.
-fn check_trace(trace: &Value, result: &Value) {
-    let events = trace["traceEvents"].as_array().unwrap();
+fn check_trace(trace: &Value, process: u32, result: &Value) {
+    let all = trace["traceEvents"].as_array().unwrap();
+    let events: Vec<&Value> = all.iter().filter(|e| e["pid"] == process).collect();
     let number = |e: &Value, k: &str| e[k].as_f64().unwrap();
     let slack = 0.5;
     for thread in [1, 2] {
@@ -153,7 +154,8 @@ fn stamps_can_be_left_out_and_time_limits_count() {
 fn two_settings_are_drawn_in_turn() {
     let dir = tempfile::tempdir().unwrap();
     let args = ["--frames", "4", "--step", "4", "--against", "cascades=1", "--against", "cascade_size=64"];
-    let both = json(dir.path(), &args);
+    let files = ["--csv", "b.csv", "--trace", "t.json", "--bmf", "m.json", "-o", "o.json"];
+    let both = json(dir.path(), &[&args[..], &files].concat());
     let other = &both["against"]["result"];
     assert_eq!((&both["settings"]["cascades"], &other["settings"]["cascades"]), (&3.0.into(), &1.0.into()));
     assert_eq!(other["settings"]["cascade_size"], 64.0);
@@ -162,6 +164,23 @@ fn two_settings_are_drawn_in_turn() {
     let start = |r: &Value, k: usize| r["frames"][k]["start_ms"].as_f64().unwrap();
     assert!(start(&both, 0) < start(other, 0) && start(other, 1) < start(&both, 1));
     assert!(start(other, 0) < start(other, 1) && start(&both, 1) < start(&both, 2));
+
+    // Every file has both settings.
+    let read = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
+    let parsed = |name: &str| serde_json::from_str::<Value>(&read(name)).unwrap();
+    assert_eq!(parsed("o.json"), both);
+    let csv = read("b.csv");
+    for setting in ["A,", "B,"] {
+        let frames = csv.lines().filter(|l| l.starts_with(setting) && l.contains(",frame,frame,"));
+        assert_eq!(frames.count(), 4, "{csv}");
+    }
+    check_trace(&parsed("t.json"), 1, &both);
+    check_trace(&parsed("t.json"), 2, other);
+    let bmf = parsed("m.json");
+    for (name, result) in [("", &both), (" cascades=1 cascade_size=64", other)] {
+        let value = &bmf[&format!("small/approach{name}/frame.cpu_ms")]["milliseconds"]["value"];
+        assert!(value.is_number() && *value == result["metrics"]["frame.cpu_ms"]["median"], "{bmf}");
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use canopy::measure::bench::{Request, Subject, plan, run as measure};
 use canopy::measure::compare::{Comparison, compare};
 use canopy::measure::path::CameraPath;
 use canopy::measure::report::markdown;
-use canopy::measure::results::BenchResult;
+use canopy::measure::results::{BenchResult, CSV_COLUMNS};
 use canopy::measure::trace::trace;
 use canopy::scene::Scene;
 use canopy::settings::Settings;
@@ -168,36 +168,38 @@ fn bench(
 /// Writes and prints.
 fn report(args: &Args, results: &[BenchResult]) -> Result<()> {
     let first = &results[0];
-    if let Some(csv) = &args.csv {
-        write(csv, &first.csv())?;
+    let knobs: Vec<String> = args.against.iter().map(|(k, v)| format!("{k}={v}")).collect();
+    let settings: Vec<(&BenchResult, &[String])> = results.iter().zip([&[][..], &knobs]).collect();
+    if let Some(file) = &args.csv {
+        let rows: String = results.iter().zip(["A", "B"]).map(|(r, setting)| r.csv_rows(setting)).collect();
+        write(file, &format!("{}\n{rows}", CSV_COLUMNS.join(",")))?;
     }
     if let Some(file) = &args.trace {
-        write(file, &trace(first).to_string())?;
+        write(file, &trace(&settings).to_string())?;
     }
     if let Some(file) = &args.bmf {
-        write(file, &format!("{:#}\n", first.bmf()))?;
+        let all: serde_json::Map<_, _> = settings.iter().flat_map(|(r, knobs)| r.bmf(knobs)).collect();
+        write(file, &format!("{:#}\n", serde_json::Value::from(all)))?;
     }
+    let against = match results.get(1) {
+        Some(result) => Some(Against { result, comparison: compare(first, result, true)? }),
+        None => None,
+    };
+    let report = Report { result: first, against };
     if let Some(file) = &args.output {
-        let text = serde_json::to_string(first).map_err(|e| Error::io(file, std::io::Error::other(e)))?;
+        let text = serde_json::to_string(&report).map_err(|e| Error::io(file, std::io::Error::other(e)))?;
         write(file, &(text + "\n"))?;
     }
-    let against =
-        results.get(1).map(|second| compare(first, second, true).map(|c| (second, c))).transpose()?;
     if args.print.json {
-        let against = against.map(|(result, comparison)| Against { result, comparison });
-        output::json(&Report { result: first, against })
+        output::json(&report)
     } else if args.markdown {
         output::print(&markdown(results))
     } else if args.print.quiet {
         Ok(())
     } else {
-        let knobs: Vec<String> = args.against.iter().map(|(k, v)| format!("{k} = {v}")).collect();
-        let compared = against.map_or(String::new(), |(_, c)| {
-            format!(
-                "\nA as above, B with {}, drawn in turn\n\n{}",
-                knobs.join(", "),
-                super::compare::text(&c)
-            )
+        let compared = report.against.map_or(String::new(), |a| {
+            let knobs = knobs.join(", ");
+            format!("\nA as above, B with {knobs}, drawn in turn\n\n{}", super::compare::text(&a.comparison))
         });
         output::print(&(text(first) + &compared))
     }

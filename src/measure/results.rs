@@ -320,12 +320,12 @@ impl BenchResult {
         self.metrics = samples.into_iter().filter_map(|(name, s)| Some((name, Summary::new(&s)?))).collect();
     }
 
-    /// A table with fixed columns, a row a frame, stage and pass.
-    pub fn csv(&self) -> String {
-        let mut text = CSV_COLUMNS.join(",") + "\n";
+    /// Rows of a table with [`CSV_COLUMNS`]: one a frame, stage and pass, of this setting ("A", or "B" with `--against`).
+    pub fn csv_rows(&self, setting: &str) -> String {
+        let mut text = String::new();
         let number = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:.6}"));
         for (k, f) in self.frames.iter().enumerate() {
-            let at = format!("{k},{},{}", f.round, f.view);
+            let at = format!("{setting},{k},{},{}", f.round, f.view);
             let made = f.produced.terrain + f.produced.seeds + f.produced.coverage;
             let gone = f.evicted.terrain + f.evicted.seeds + f.evicted.coverage;
             text += &format!(
@@ -359,21 +359,24 @@ impl BenchResult {
         text
     }
 
-    /// Bencher Metric Format: a benchmark `SCENE/PATH/METRIC`, its median in milliseconds with its 95 % interval.
-    pub fn bmf(&self) -> serde_json::Value {
+    /// Bencher Metric Format: a benchmark `SCENE/PATH/METRIC`, its median in milliseconds with its 95 % interval. What makes
+    /// this setting another than the scene's (`KNOB=VALUE`) stands behind the path's name, if something does.
+    pub fn bmf(&self, knobs: &[String]) -> serde_json::Map<String, serde_json::Value> {
         let mut all = serde_json::Map::new();
+        let setting: String = knobs.iter().map(|k| format!(" {k}")).collect();
         for (name, s) in &self.metrics {
             let [lower, upper] = s.interval;
             let value = serde_json::json!({ "value": s.median, "lower_value": lower, "upper_value": upper });
-            let benchmark = format!("{}/{}/{name}", self.scene.name, self.path.name);
+            let benchmark = format!("{}/{}{setting}/{name}", self.scene.name, self.path.name);
             all.insert(benchmark, serde_json::json!({ "milliseconds": value }));
         }
-        all.into()
+        all
     }
 }
 
-/// Columns of [`BenchResult::csv`].
-pub const CSV_COLUMNS: [&str; 19] = [
+/// Columns of [`BenchResult::csv_rows`].
+pub const CSV_COLUMNS: [&str; 20] = [
+    "setting",
     "frame",
     "round",
     "view",

@@ -9,13 +9,30 @@ const CPU: u32 = 1;
 /// Thread of the device's queue.
 const GPU: u32 = 2;
 
-/// The trace of a result. Without calibrated timestamps a frame's GPU events begin at its submission, and say so.
-pub fn trace(result: &BenchResult) -> Value {
-    let mut events = vec![
-        named("process_name", CPU, &format!("canopy bench {}", result.scene.name)),
-        named("thread_name", CPU, "frames (CPU)"),
-        named("thread_name", GPU, &format!("queue of {}", result.device.name)),
-    ];
+/// The trace of results that were measured in turn, each with what makes its setting another (empty for the first): a
+/// process each, as all their times are from one start. Without calibrated timestamps a frame's GPU events begin at its
+/// submission, and say so.
+pub fn trace(results: &[(&BenchResult, &[String])]) -> Value {
+    let mut events = Vec::new();
+    for (&(result, knobs), process) in results.iter().zip(1..) {
+        let setting: String = knobs.iter().map(|k| format!(" {k}")).collect();
+        let names = [
+            ("process_name", CPU, format!("canopy bench {}{setting}", result.scene.name)),
+            ("thread_name", CPU, "frames (CPU)".into()),
+            ("thread_name", GPU, format!("queue of {}", result.device.name)),
+        ];
+        events.extend(names.iter().map(|(what, thread, name)| named(what, *thread, name)));
+        events.extend(frames(result));
+        for event in events.iter_mut().filter(|e| e["pid"].is_null()) {
+            event["pid"] = process.into();
+        }
+    }
+    json!({ "displayTimeUnit": "ms", "traceEvents": events })
+}
+
+/// Events of a result's frames.
+fn frames(result: &BenchResult) -> Vec<Value> {
+    let mut events = Vec::new();
     for (k, f) in result.frames.iter().enumerate() {
         let arguments = json!({ "round": f.round, "view": f.view, "cpu_ms": f.cpu_ms, "draws": f.draws,
             "trees_zfield": f.trees_zfield, "calibrated": f.gpu_start_ms.is_some() });
@@ -30,7 +47,7 @@ pub fn trace(result: &BenchResult) -> Value {
             events.push(event(&s.name, GPU, start + s.start_ms, s.gpu_ms, arguments_of(s)));
         }
     }
-    json!({ "displayTimeUnit": "ms", "traceEvents": events })
+    events
 }
 
 fn arguments_of(scope: &Scope) -> Value {
@@ -38,11 +55,11 @@ fn arguments_of(scope: &Scope) -> Value {
 }
 
 fn named(what: &str, thread: u32, name: &str) -> Value {
-    json!({ "name": what, "ph": "M", "pid": 1, "tid": thread, "args": { "name": name } })
+    json!({ "name": what, "ph": "M", "tid": thread, "args": { "name": name } })
 }
 
 /// A complete event; times in ms.
 fn event(name: &str, thread: u32, start: f64, length: f64, arguments: Value) -> Value {
-    json!({ "name": name, "cat": if thread == GPU { "gpu" } else { "cpu" }, "ph": "X", "pid": 1, "tid": thread,
+    json!({ "name": name, "cat": if thread == GPU { "gpu" } else { "cpu" }, "ph": "X", "tid": thread,
         "ts": 1e3 * start, "dur": 1e3 * length, "args": arguments })
 }
