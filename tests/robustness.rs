@@ -152,7 +152,7 @@ fn a_full_disk_is_2_and_leaves_what_was_there() {
     // Traced: drivers keep device memory in files (lavapipe from Mesa 24 on), which the limit would end first.
     let scene = dir.path().join("s.toml");
     fs::write(&scene, SCENE).unwrap();
-    let traced = ["--size", "48x32", "--representation", "reference", "--until", "1spp", "--quiet", "-o"];
+    let traced = ["--size", "48x32", "--representation", "reference", "--until", "2spp", "--quiet", "-o"];
     let out = limited(1, true).arg("render").arg(&scene).args(traced).arg(&png).output().unwrap();
     assert_eq!(out.status.code(), Some(2), "{}", said(&out));
     assert!(said(&out).contains("a.png"), "{}", said(&out));
