@@ -75,8 +75,10 @@ fn streaming(c: &mut Criterion) {
 
 fn baking(c: &mut Criterion) {
     let mesh = model::load_named(Path::new("builtin:birch"), None).unwrap();
-    let (optics, settings) =
-        (OpticsOverride::default(), BakeSettings { rings: 3, resolution: 64, occlusion_rays: 16 });
+    let (optics, settings) = (
+        OpticsOverride::default(),
+        BakeSettings { rings: 3, resolution: 64, occlusion_rays: 16, transfer_bands: 0 },
+    );
     let mut group = c.benchmark_group("bake");
     group.sample_size(10).measurement_time(Duration::from_secs(8));
     group.bench_function("birch, 25 views of 64²", |b| {

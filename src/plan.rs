@@ -136,6 +136,8 @@ pub struct Plan {
     /// Whether light meets the average light that the pair tables hold (BN12, G and T): that of a sun, and where it
     /// converges at any distance that there is.
     pub pair_tables: bool,
+    /// Bands of light transfer: how well texels of trees that are drawn one by one know from where the sun reaches them.
+    pub transfer_bands: u32,
     /// Shadow cascades; 0 without sun.
     pub cascades: u32,
     /// Distance that the cascades reach, m.
@@ -239,6 +241,7 @@ impl Plan {
             layers,
             z_fields: false,
             pair_tables: false,
+            transfer_bands: 0,
             cascades: if has_sun { s.cascades } else { 0 },
             shadow_distance: 0.0,
             species_range: Vec::new(),
@@ -276,6 +279,9 @@ impl Plan {
             plan.pair_tables = has_sun && representation != Representation::ZField;
             plan.z_fields =
                 std::iter::once(&eye.position).chain(places).any(|p| plan.scene_in_range(scene, *p));
+            if plan.z_fields && has_sun {
+                plan.transfer_bands = scene.settings.transfer_bands;
+            }
             if !plan.z_fields {
                 (plan.seed_regions, plan.silhouette_quads, plan.tree_capacity) = (0, 0, 0);
             }
@@ -484,6 +490,12 @@ impl Plan {
             for species in &scene.species {
                 let reason = format!("species \"{}\" is drawn tree by tree", species.name);
                 add("data", &format!("z-field views of {}", species.name), reason, views);
+                if self.transfer_bands > 0 {
+                    // Half as many texels a side.
+                    let bytes = u64::from(self.transfer_bands) * views / 4;
+                    let reason = format!("sunlight on leaves of species \"{}\", tree by tree", species.name);
+                    add("data", &format!("light transfer of {}", species.name), reason, bytes);
+                }
             }
         }
         if trees {

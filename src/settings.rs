@@ -74,19 +74,20 @@ macro_rules! knobs {
 }
 
 knobs! {
-    view_rings: u32, "", 1..=16, [6, 9, 9], bake [4, 6, 9, 12], "rings n of z-field views: 2n(n+1)+1 views over the hemisphere (9: 181); memory and bake time grow with the square";
+    view_rings: u32, "", 1..=16, [6, 9, 12], bake [4, 6, 9, 12], "rings n of z-field views: 2n(n+1)+1 views over the hemisphere (9: 181); memory and bake time grow with the square";
     view_resolution: u32, "texels", 16..=512, [128, 256, 256], bake [64, 128, 256, 512], "texels a side of a z-field view (a power of two); memory and bake time grow with the square";
     view_iterations: u32, "", 1..=4, [1, 2, 3], bake [1, 2, 3, 4], "fixed-point iterations for the view ray; each costs three texel fetches a fragment";
     light_iterations: u32, "", 0..=2, [1, 1, 1], bake [0, 2, 1], "iterations for the light ray; 0 leaves out what grows with its length; self-shadow is measured for 1";
+    transfer_bands: u32, "", 0..=2, [0, 1, 2], bake [0, 1, 2], "bands of light transfer, which knows from where the sun reaches each texel's leaves (0: none); each a quarter of the views' memory and three texel fetches a fragment";
     occlusion_rays: u32, "", 8..=1024, [32, 64, 128], bake [16, 32, 64, 128, 256], "rays a cell for baked ambient occlusion; bake time";
     samples: u32, "", 1..=8, [4, 4, 8], draw [1, 4, 8], "samples a pixel (1, 4 or 8, as far as the device goes): levels of opacity; fill cost";
-    zfield_min_pixels: f32, "px", 0.25..=64.0, [4.0, 3.0, 2.0], draw [8.0, 6.0, 4.0, 3.0, 2.0, 1.5], "apparent tree height under which trees are no longer drawn one by one; cost grows with its inverse square";
+    zfield_min_pixels: f32, "px", 0.25..=64.0, [4.0, 3.0, 3.0], draw [8.0, 6.0, 4.0, 3.0, 2.0, 1.5], "apparent tree height under which trees are no longer drawn one by one; cost grows with its inverse square";
     convergence: f32, "", 0.1..=0.8, [0.4, 0.45, 0.45], draw [0.3, 0.4, 0.45, 0.6, 0.8], "part of the tree-by-tree range at which light and shadow have become the averages of the tables (BN12, eq. 22-25: 0.8); cost of shadows grows with the square";
     silhouette_min_pixels: f32, "px", 0.25..=64.0, [1.0, 1.0, 1.0], draw [2.0, 1.0, 0.5], "apparent height under which trees on the silhouettes of ridges are no longer drawn either; from zfield_min_pixels on they are as others";
     zfield_max_trees: u32, "", 1..=16000000, [1000000, 2000000, 4000000], draw [], "most trees drawn one by one; bounds memory";
     cascades: u32, "", 1..=4, [3, 4, 4], draw [1, 2, 3, 4], "shadow cascades; each draws the trees of its slice again";
-    cascade_size: u32, "texels", 64..=8192, [512, 1024, 2048], draw [256, 512, 1024, 2048, 4096], "texels a side of a cascade; fill cost";
-    cascade_split: f32, "", 0.0..=1.0, [0.8, 0.8, 0.95], draw [0.5, 0.8, 0.95], "0 uniform, 1 logarithmic cascade ranges (parallel-split)";
+    cascade_size: u32, "texels", 64..=8192, [512, 1024, 4096], draw [256, 512, 1024, 2048, 4096], "texels a side of a cascade; fill cost";
+    cascade_split: f32, "", 0.0..=1.0, [0.95, 0.95, 0.95], draw [0.5, 0.8, 0.95, 0.99], "0 uniform, 1 logarithmic cascade ranges (parallel-split)";
     shadow_distance: f32, "m", 0.0..=1000000.0, [0.0, 0.0, 0.0], draw [], "range of the cascades; 0 is as far as light has not converged";
     coverage_size: u32, "texels", 32..=1024, [128, 256, 512], draw [64, 128, 256, 512], "texels a side of the coverage tile of a terrain quad; memory and the time to make one grow with the square";
     terrain_pixels: f32, "px", 1.0..=64.0, [12.0, 8.0, 4.0], draw [20.0, 12.0, 8.0, 4.0, 2.0], "size of a terrain mesh cell on the screen; vertices grow with the inverse square";

@@ -10,7 +10,7 @@ use canopy::bake::cache::{self, CacheState, load_or_bake};
 use canopy::bake::{BakeSettings, SpeciesBake};
 use canopy::scene::{Mesh, OpticsOverride, Texture};
 
-const SMALL: BakeSettings = BakeSettings { rings: 1, resolution: 16, occlusion_rays: 1 };
+const SMALL: BakeSettings = BakeSettings { rings: 1, resolution: 16, occlusion_rays: 1, transfer_bands: 2 };
 
 fn tree() -> Mesh {
     let mut mesh = common::ellipsoid(1.0, 2.0, 6);
@@ -75,6 +75,8 @@ fn everything_that_a_bake_depends_on_is_in_the_key() {
         BakeSettings { rings: 2, ..SMALL },
         BakeSettings { resolution: 32, ..SMALL },
         BakeSettings { occlusion_rays: 2, ..SMALL },
+        BakeSettings { transfer_bands: 0, ..SMALL },
+        BakeSettings { transfer_bands: 1, ..SMALL },
     ] {
         keys.push(cache::key(&tree(), &optics, &s));
     }

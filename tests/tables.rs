@@ -79,7 +79,7 @@ fn spheres() -> &'static ForestTables {
 fn ellipsoids() -> &'static SpeciesBake {
     static BAKE: OnceLock<SpeciesBake> = OnceLock::new();
     BAKE.get_or_init(|| {
-        let settings = BakeSettings { rings: 6, resolution: 64, occlusion_rays: 8 };
+        let settings = BakeSettings { rings: 6, resolution: 64, occlusion_rays: 8, transfer_bands: 0 };
         bake_species(&common::ellipsoid(2.0, 4.0, 24), &Default::default(), &settings, true).unwrap()
     })
 }
@@ -446,7 +446,7 @@ fn angles_are_those_of_the_scaled_space() {
 #[test]
 fn fast_rays_agree_with_the_model() {
     let mesh = common::real_tree("oak");
-    let settings = BakeSettings { rings: 4, resolution: 64, occlusion_rays: 4 };
+    let settings = BakeSettings { rings: 4, resolution: 64, occlusion_rays: 4, transfer_bands: 0 };
     let bake = bake_species(&mesh, &Default::default(), &settings, true).unwrap();
     for (resolution, level) in [(64, 0), (32, 1)] {
         for iterations in 1..=3 {

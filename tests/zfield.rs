@@ -9,7 +9,7 @@ use glam::DVec3;
 
 /// An ellipsoid fills the scaled cylinder as the unit sphere, whatever its proportions.
 fn sphere(rings: u32) -> SpeciesBake {
-    let settings = BakeSettings { rings, resolution: 128, occlusion_rays: 16 };
+    let settings = BakeSettings { rings, resolution: 128, occlusion_rays: 16, transfer_bands: 0 };
     bake_species(&common::ellipsoid(3.0, 6.0, 96), &Default::default(), &settings, true).unwrap()
 }
 

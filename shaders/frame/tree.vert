@@ -5,6 +5,7 @@
 #include "interface.glsl"
 #include "physics/hash.glsl"
 #include "physics/light.glsl"
+#include "physics/transfer.glsl"
 #include "physics/zfield.glsl"
 #include "frame/tree_space.glsl"
 
@@ -33,6 +34,7 @@ layout(location = 21) flat out uvec4 tree_bits; // mask row; cascade | from belo
 layout(location = 22) flat out vec2 own;       // dither, c of the self-shadow times the root of the phase angle
 layout(location = 23) flat out vec4 bark;       // relative colour; w: height under which there is only bark
 layout(location = 24) flat out vec4 mean_sun;   // average light, times nu; w: 1 - nu
+layout(location = 26) flat out vec4 sun_from;   // in the tree's own axes; w: reach of light transfer
 layout(location = 25) flat out vec4 mean_sky;   // w: average lit fraction, times nu
 
 void main() {
@@ -64,7 +66,8 @@ void main() {
     vec3 position = world_from_tree(t, kind, p);
     gl_Position = v.clip_from_world * vec4(position, 1.0);
 
-    vec3 l = (back * v.sun_direction) / half_extent;
+    vec3 toward = back * v.sun_direction;
+    vec3 l = toward / half_extent;
     for (int i = 0; i < 3; i++) {
         ViewBasis b = bases.items[uint(layers[i])];
         view_p[i] = vec4(project(b, p), p.z);
@@ -84,6 +87,7 @@ void main() {
     weights = vec4(t.view_weights, t.light_weights);
     // The model's metres: what is in a crown grows with it.
     float phase_angle = angle_between(-t.centre, v.sun_direction);
+    sun_from = vec4(toward, transfer_reach(sqrt(phase_angle)));
     optics = vec4(t.mip, kind.extinction * phase_angle / t.scale, t.fade, c.z);
     sun = vec4(t.sun, t.hole);
     sky = vec4(t.sky, half_extent.z);

@@ -4,6 +4,7 @@
 #include "physics/masks.glsl"
 #include "physics/zfield.glsl"
 #include "physics/shadow.glsl"
+#include "physics/transfer.glsl"
 
 layout(location = 0) in vec4 view_p[3];
 layout(location = 3) in vec3 light_p[3];
@@ -21,15 +22,19 @@ layout(location = 22) flat in vec2 own; // dither, c of the self-shadow times th
 layout(location = 23) flat in vec4 bark;
 layout(location = 24) flat in vec4 mean_sun;
 layout(location = 25) flat in vec4 mean_sky;
+layout(location = 26) flat in vec4 sun_from; // in the tree's own axes; w: reach of light transfer
 
 layout(binding = 6) uniform sampler2DArray views;
 layout(binding = 7) uniform sampler2DArray shadow_map;
+layout(binding = 8) uniform sampler2DArray transfer_1;
+layout(binding = 9) uniform sampler2DArray transfer_2;
 layout(constant_id = 3) const uint SAMPLES = 4u;
 layout(constant_id = 4) const uint ESTIMATES = 1u;
 layout(constant_id = 7) const bool MAGNIFIED = false;
 layout(constant_id = 5) const int LIGHT_ITERATIONS = 1;
 layout(constant_id = 6) const bool HAS_SUN = true;
 layout(constant_id = 8) const bool CONVERGED = false; // to the average light: nothing of the tree's own is left
+layout(constant_id = 9) const uint TRANSFER_BANDS = 0u;
 
 // Returns the species, counted from 1. Sets sample mask and depth. `lit` is the fraction of the sun that arrives.
 uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
@@ -87,7 +92,17 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
         uint cascade = tree_bits.w & 15u;
         float visible = sun_visibility(shadow_map, entry, vec2(0.0), min(cascade, 3u));
         through *= cascade < 4u ? visible : 1.0;
-        sun_part += sun.rgb * colour * through;
+        float reached = through;
+        // From below, views show the other side.
+        if (TRANSFER_BANDS > 0u && !below) {
+            vec3 shares = at.shares / max(at.shares.x + at.shares.y + at.shares.z, 1e-6);
+            // Half as many texels a side as a view has.
+            float mip = max(optics.x - 1.0, 0.0);
+            float x = transfer_fetch(transfer_1, transfer_first(sun_from.xyz), p, d, layers, shares, mip, s);
+            if (TRANSFER_BANDS > 1u) x += transfer_fetch(transfer_2, transfer_second(sun_from.xyz), p, d, layers, shares, mip, s);
+            reached *= max(1.0 + sun_from.w * x, 0.0);
+        }
+        sun_part += sun.rgb * colour * reached;
         lit += mean_sun.w * through;
     }
     // Depth under the top of the canopy, for the sky through the hole around the tree.

@@ -10,6 +10,7 @@ struct Surface {
     float s;          // along the ray; where nothing is, the last estimate
     float opacity;
     float occlusion;  // sky visibility in the isolated tree
+    vec3 shares;      // of the opacity, by view
 };
 
 // Depth by which a view may disagree with the point found so far before it counts half.
@@ -44,6 +45,7 @@ float zfield_estimate(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_d
 Surface zfield_fetch(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_depth, vec3 layers, vec3 weights, float mip,
                      float s, bool farthest, bool refine) {
     float sum_s = 0.0, opacity = 0.0, occlusion = 0.0, sum_k = 0.0;
+    vec3 shares;
     for (int i = 0; i < 3; i++) {
         vec2 uv = p[i].xy + s * d[i].xy + 0.5;
         vec4 t = textureLod(views, vec3(uv, layers[i]), mip);
@@ -54,11 +56,12 @@ Surface zfield_fetch(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_de
         float k = weights[i] * (1.0 - other);
         sum_k += k;
         sum_s += k * (z - t.a * p[i].z) * inverse_depth[i];
-        opacity += k * t.a;
+        shares[i] = k * t.a;
+        opacity += shares[i];
         occlusion += k * t.b;
     }
     float inverse = opacity > 0.0 ? 1.0 / opacity : 0.0;
-    return Surface(opacity > 0.0 ? sum_s * inverse : s, opacity / max(sum_k, 1e-6), min(occlusion * inverse, 1.0));
+    return Surface(opacity > 0.0 ? sum_s * inverse : s, opacity / max(sum_k, 1e-6), min(occlusion * inverse, 1.0), shares);
 }
 
 // The surface on a ray: `estimates` unfiltered and `filtered` filtered iterations that only move the point, then one that

@@ -11,6 +11,7 @@
 #include "physics/tonemap.glsl"
 #include "physics/handover.glsl"
 #include "physics/tables.glsl"
+#include "physics/transfer.glsl"
 
 struct Arguments {
     uvec4 a;
@@ -76,6 +77,11 @@ void main() {
         }
         // As frame/tree.vert and frame/tree_shade.glsl share it between them.
         case 15u: r.a.x = floatBitsToUint(self_shadow(a.z * sqrt(a.x), a.w * a.x, a.y)); break;
+        case 16u: {
+            float x = dot(transfer_decode(a), transfer_first(c.xyz)) + dot(transfer_decode(b), transfer_second(c.xyz));
+            r.a.x = floatBitsToUint(max(1.0 + transfer_reach(sqrt(c.w)) * x, 0.0));
+            break;
+        }
     }
     results.items[k] = r;
 }

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::file::{Fields, Format, load_or_build};
-use super::{BakeSettings, SpeciesBake, Turned, ZField, bake_species, check};
+use super::{BakeSettings, SpeciesBake, Transfer, Turned, ZField, bake_species, check};
 use crate::Result;
 use crate::physics::views;
 use crate::scene::{Mesh, OpticsOverride};
 
-const FORMAT: Format = Format { magic: *b"CANOPYZF", version: 8, extension: "zfield" };
+const FORMAT: Format = Format { magic: *b"CANOPYZF", version: 13, extension: "zfield" };
 const SCALARS: usize = 23;
 
 /// Where a bake came from.
@@ -65,7 +65,7 @@ pub fn load_or_bake(
         |parts| decode(parts, settings),
         |bake, put| {
             put(&scalars(bake).map(f32::to_le_bytes).concat())?;
-            bake.views.levels.iter().try_for_each(|l| put(l))
+            bake.views.levels.iter().chain(bake.transfer.bands.iter().flatten()).try_for_each(|l| put(l))
         },
         || bake_species(mesh, optics, settings, quiet),
         quiet,
@@ -78,7 +78,7 @@ pub fn key(mesh: &Mesh, optics: &OpticsOverride, settings: &BakeSettings) -> [u8
     let mut fields = Fields::new("canopy species bake");
     let mut put = |bytes: &[u8]| fields.put(bytes);
     put(&FORMAT.version.to_le_bytes());
-    for x in [settings.rings, settings.resolution, settings.occlusion_rays] {
+    for x in [settings.rings, settings.resolution, settings.occlusion_rays, settings.transfer_bands] {
         put(&x.to_le_bytes());
     }
     for rgb in [optics.leaf_reflectance, optics.leaf_transmittance, optics.bark_reflectance] {
@@ -136,15 +136,21 @@ fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
     ]
 }
 
-/// Bytes of every level, from the settings alone.
+/// Bytes of every level of z-field and transfer, from the settings alone.
 fn level_sizes(settings: &BakeSettings) -> impl Iterator<Item = usize> {
     let views = views::count(settings.rings) as usize;
-    let resolution = settings.resolution as usize;
-    (0..=resolution.ilog2()).map(move |l| views * 4 * (resolution >> l).pow(2))
+    let levels = move |resolution: u32| {
+        (0..=resolution.ilog2()).map(move |l| views * 4 * (resolution as usize >> l).pow(2))
+    };
+    let transfer = (0..settings.transfer_bands).flat_map(move |_| levels(settings.resolution / 2));
+    levels(settings.resolution).chain(transfer)
 }
 
 fn decode(mut parts: Vec<Vec<u8>>, settings: &BakeSettings) -> SpeciesBake {
-    let levels = parts.split_off(1);
+    let mut levels = parts.split_off(1);
+    let transfer = levels.split_off(settings.resolution.ilog2() as usize + 1);
+    let resolution = if settings.transfer_bands > 0 { settings.resolution / 2 } else { 0 };
+    let bands = transfer.chunks(settings.resolution.ilog2() as usize).map(<[_]>::to_vec).collect();
     let mut x = [0f32; SCALARS];
     for (x, from) in x.iter_mut().zip(parts[0].as_chunks::<4>().0) {
         *x = f32::from_le_bytes(*from);
@@ -176,6 +182,7 @@ fn decode(mut parts: Vec<Vec<u8>>, settings: &BakeSettings) -> SpeciesBake {
     ] = x;
     SpeciesBake {
         views: ZField { n: settings.rings, resolution: settings.resolution, levels },
+        transfer: Transfer { resolution, bands },
         center,
         radius,
         half_height,

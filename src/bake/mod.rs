@@ -11,6 +11,7 @@ mod scene;
 mod self_shadow;
 pub(crate) mod surface;
 pub mod tables;
+mod transfer;
 mod verify;
 mod views;
 
@@ -32,6 +33,8 @@ use surface::Surface;
 pub struct SpeciesBake {
     /// The depth views.
     pub views: ZField,
+    /// Light transfer of the same views.
+    pub transfer: Transfer,
     /// Centre of the crown box, m above the trunk base along z, on the trunk axis: `o` = (0, 0, `center`).
     pub center: f32,
     /// Half extent of the tree in x and y about the trunk axis, m: S = diag(radius, radius, half_height).
@@ -117,6 +120,15 @@ pub struct ZField {
     pub levels: Vec<Vec<u8>>,
 }
 
+/// Light transfer ([`crate::physics::transfer`]) of the views of a z-field: a texture array like its own, but smaller.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Transfer {
+    /// Texels a side of level 0: half of the views'.
+    pub resolution: u32,
+    /// Per band and level, all layers one after the other, rows from the bottom (v = 0) up: coefficients of each texel, encoded.
+    pub bands: Vec<Vec<Vec<u8>>>,
+}
+
 /// What a bake depends on beside the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BakeSettings {
@@ -126,25 +138,33 @@ pub struct BakeSettings {
     pub resolution: u32,
     /// Rays for ambient occlusion in each of the grid's cells with a surface in it, at least 1.
     pub occlusion_rays: u32,
+    /// Bands of light transfer, 0 to 2.
+    pub transfer_bands: u32,
 }
 
 impl From<&Settings> for BakeSettings {
     fn from(s: &Settings) -> Self {
-        BakeSettings { rings: s.view_rings, resolution: s.view_resolution, occlusion_rays: s.occlusion_rays }
+        BakeSettings {
+            rings: s.view_rings,
+            resolution: s.view_resolution,
+            occlusion_rays: s.occlusion_rays,
+            transfer_bands: s.transfer_bands,
+        }
     }
 }
 
 /// Refuses settings that no bake can be made with.
 fn check(settings: &BakeSettings) -> Result<()> {
-    let BakeSettings { rings, resolution, occlusion_rays } = *settings;
+    let BakeSettings { rings, resolution, occlusion_rays, transfer_bands } = *settings;
     if !(1..=16).contains(&rings)
         || !(16..=512).contains(&resolution)
         || !resolution.is_power_of_two()
         || occlusion_rays == 0
+        || transfer_bands > 2
     {
         return Err(Error::Usage(format!(
-            "cannot bake {rings} rings of {resolution} texels with {occlusion_rays} rays: \
-             1 to 16 rings, a power of two from 16 to 512 texels and at least one ray"
+            "cannot bake {rings} rings of {resolution} texels with {occlusion_rays} rays and {transfer_bands} bands of transfer: \
+             1 to 16 rings, a power of two from 16 to 512 texels, at least one ray and at most two bands"
         )));
     }
     Ok(())
@@ -167,5 +187,7 @@ pub fn bake_species(
     let progress = Progress::new("baking views", u64::from(count), quiet);
     let field = views::draw(&surface, &occlusion, settings.rings, settings.resolution, &progress);
     progress.finish();
-    Ok(optics::species(mesh, &surface, field, optics))
+    let mut bake = optics::species(mesh, &surface, field, optics);
+    bake.transfer = transfer::draw(mesh, &surface, &bake, settings.transfer_bands, quiet);
+    Ok(bake)
 }

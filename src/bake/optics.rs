@@ -12,7 +12,7 @@ use std::collections::HashSet;
 use glam::{Vec2, Vec3};
 
 use super::surface::Surface;
-use super::{SpeciesBake, ZField, self_shadow};
+use super::{SpeciesBake, Transfer, ZField, self_shadow};
 use crate::physics::tonemap::linear as linear_from_srgb;
 use crate::physics::views;
 use crate::scene::{Material, Mesh, OpticsOverride, Texture};
@@ -171,6 +171,7 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
     let area = top_area(&views) * f64::from(frame.radius).powi(2);
     SpeciesBake {
         views,
+        transfer: Transfer::default(),
         center: frame.center,
         radius: frame.radius,
         half_height: frame.half_height,

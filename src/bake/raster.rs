@@ -16,7 +16,12 @@ pub struct Raster {
     pub nearest: Vec<f32>,
     /// Smallest depth along w, +∞ where there is nothing.
     pub farthest: Vec<f32>,
+    /// Index of the nearest face, [`NO_FACE`] where there is none.
+    pub faces: Vec<u32>,
 }
+
+/// Where a raster has no face.
+pub const NO_FACE: u32 = u32::MAX;
 
 /// Where samples of a view lie in scaled tree space.
 #[derive(Clone, Copy, Debug)]
@@ -56,28 +61,34 @@ impl Raster {
     pub fn new(resolution: u32) -> Self {
         let size = resolution * SUBSAMPLES;
         let n = (size * size) as usize;
-        Raster { size, nearest: vec![f32::NEG_INFINITY; n], farthest: vec![f32::INFINITY; n] }
+        Raster {
+            size,
+            nearest: vec![f32::NEG_INFINITY; n],
+            farthest: vec![f32::INFINITY; n],
+            faces: vec![NO_FACE; n],
+        }
     }
 
     /// Draws a view of the surface, in place of what was there.
     pub fn draw(&mut self, surface: &Surface, view: &View) {
         self.nearest.fill(f32::NEG_INFINITY);
         self.farthest.fill(f32::INFINITY);
+        self.faces.fill(NO_FACE);
         let scale = Vec2::splat(0.5 * self.size as f32) / view.half;
         let middle = 0.5 * self.size as f32;
-        for face in &surface.faces {
+        for (index, face) in surface.faces.iter().enumerate() {
             let corners = face.p.map(|p| {
                 let xy = Vec2::new(p.dot(view.right), p.dot(view.up)) * scale + middle;
                 Vec3::new(xy.x, xy.y, p.dot(view.w))
             });
-            self.draw_face(surface, face, corners);
+            self.draw_face(surface, (face, index as u32), corners);
         }
     }
 
     /// One triangle by rows. A sample belongs to it if its middle lies on or right of the left edge and left
     /// of the right edge; both neighbours compute a shared edge alike (from its lower end), so no sample is
     /// lost or drawn twice between them.
-    fn draw_face(&mut self, surface: &Surface, face: &Face, corners: [Vec3; 3]) {
+    fn draw_face(&mut self, surface: &Surface, (face, index): (&Face, u32), corners: [Vec3; 3]) {
         let mut order = [0, 1, 2];
         order.sort_by(|&a, &b| corners[a].y.total_cmp(&corners[b].y));
         let [a, b, c] = order.map(|i| corners[i]);
@@ -123,9 +134,8 @@ impl Raster {
             let (ddepth, du, dv) = (depth.1 as f32, u.1 as f32, v.1 as f32);
             let start = (row * self.size) as usize;
             let span = start + left as usize..start + right as usize;
-            for (i, (near, far)) in
-                self.nearest[span.clone()].iter_mut().zip(&mut self.farthest[span]).enumerate()
-            {
+            let depths = self.nearest[span.clone()].iter_mut().zip(&mut self.farthest[span.clone()]);
+            for (i, ((near, far), nearest)) in depths.zip(&mut self.faces[span]).enumerate() {
                 let t = i as f32;
                 let d = (depth0 + t * ddepth).clamp(low, high);
                 // The mask is looked up only where the sample would change anything: late in a dense
@@ -133,7 +143,9 @@ impl Raster {
                 if (d > *near || d < *far)
                     && mask.is_none_or(|m| m.opaque(Vec2::new(u0 + t * du, v0 + t * dv)))
                 {
-                    *near = near.max(d);
+                    if d > *near {
+                        (*near, *nearest) = (d, index);
+                    }
                     *far = far.min(d);
                 }
             }

@@ -8,6 +8,7 @@ use crate::bake::{Baked, ZField, tables};
 use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
 use crate::physics::masks::combination_table;
+use crate::physics::transfer::NEUTRAL;
 use crate::physics::views;
 use crate::plan::Plan;
 use crate::scene::{Distribution, Raster, Scene, Species, TreePosition};
@@ -23,6 +24,8 @@ pub struct SpeciesData {
     pub table: Buffer,
     /// z-field views, species after species.
     pub views: Image,
+    /// Light transfer of the same views by band; of bands that are not used one texel.
+    pub transfer: [Image; 2],
     /// Bases of the views, species after species.
     pub bases: Buffer,
     /// Combination table of sample masks.
@@ -63,6 +66,7 @@ impl SpeciesData {
                 gpu.upload_image(&texels, level as u32, k as u32 * view_count, view_count, bytes)?;
             }
         }
+        let transfer = [transfer(gpu, plan, baked, 0)?, transfer(gpu, plan, baked, 1)?];
         let bases: Vec<ViewBasis> = baked.iter().flat_map(|b| view_bases(&b.species.views)).collect();
         let maps: Vec<Option<Map>> =
             scene.species.iter().map(|s| density_map(s, scene.terrain.extent)).collect();
@@ -98,6 +102,7 @@ impl SpeciesData {
             rows,
             count: scene.species.len() as u32,
             views: texels,
+            transfer,
             bases: gpu.buffer_with("view bases", &bases)?,
             mask_rows: masks.len() as u32,
             masks: gpu.buffer_with("sample masks", &masks)?,
@@ -105,6 +110,33 @@ impl SpeciesData {
             map_count,
         })
     }
+}
+
+/// Uploads a band of the light transfer of all species.
+fn transfer(gpu: &Gpu, plan: &Plan, baked: &[Baked], band: u32) -> Result<Image> {
+    let used = band < plan.transfer_bands;
+    let first = &baked[0].species;
+    let view_count = views::count(first.views.n);
+    let side = if used { first.transfer.resolution } else { 1 };
+    let image = gpu.image(&ImageDesc {
+        name: "light transfer",
+        format: vk::Format::R8G8B8A8_UNORM,
+        size: [side; 2],
+        layers: if used { view_count * baked.len() as u32 } else { 1 },
+        levels: side.ilog2() + 1,
+        samples: 1,
+        usage: vk::ImageUsageFlags::empty(),
+    })?;
+    if !used {
+        gpu.upload_image(&image, 0, 0, 1, &NEUTRAL)?;
+        return Ok(image);
+    }
+    for (k, bake) in baked.iter().map(|b| &b.species).enumerate() {
+        for (level, bytes) in bake.transfer.bands[band as usize].iter().enumerate() {
+            gpu.upload_image(&image, level as u32, k as u32 * view_count, view_count, bytes)?;
+        }
+    }
+    Ok(image)
 }
 
 /// The projection into every view of a species, and what each view shows.

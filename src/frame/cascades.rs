@@ -21,17 +21,16 @@ pub struct Cascade {
     pub planes: Vec<[f64; 4]>,
 }
 
-/// The cascades of an eye, from `near` to `far` metres.
+/// The cascades of an eye to `far` metres, split as if they began at `near`; nothing is nearer than `clear`.
 pub fn cascades(
     eye: &Eye,
     sun: [f64; 3],
-    near: f64,
-    far: f64,
+    (clear, near, far): (f64, f64, f64),
     count: u32,
     split: f64,
     texels: u32,
 ) -> Vec<Cascade> {
-    let mut from = 0.0;
+    let mut from = clear;
     parallel_splits(near, far.max(near * 1.01), count, split)
         .into_iter()
         .map(|to| {
@@ -111,7 +110,7 @@ mod tests {
     fn every_visible_point_is_in_its_cascade() {
         let e = eye([100.0, 200.0, 30.0], [0.5, 0.8, -0.1]);
         let sun = normalize([0.3, -0.6, 0.5]);
-        let all = cascades(&e, sun, 5.0, 4000.0, 4, 0.8, 1024);
+        let all = cascades(&e, sun, (0.0, 5.0, 4000.0), 4, 0.8, 1024);
         let mut from = 0.0;
         for c in &all {
             for k in 0..500 {
@@ -129,9 +128,9 @@ mod tests {
     #[test]
     fn texels_stay_put_when_the_camera_moves_and_turns() {
         let sun = normalize([0.3, -0.6, 0.5]);
-        let a = cascades(&eye([0.0; 3], [0.0, 1.0, 0.0]), sun, 5.0, 4000.0, 4, 0.8, 512);
+        let a = cascades(&eye([0.0; 3], [0.0, 1.0, 0.0]), sun, (0.0, 5.0, 4000.0), 4, 0.8, 512);
         let e = eye([3.21, -1.7, 0.4], [0.3, 0.9, -0.2]);
-        let b = cascades(&e, sun, 5.0, 4000.0, 4, 0.8, 512);
+        let b = cascades(&e, sun, (0.0, 5.0, 4000.0), 4, 0.8, 512);
         for (a, b) in a.iter().zip(&b) {
             assert!((a.half - b.half).abs() < 1e-9 * a.half);
             for k in 0..2 {

@@ -85,11 +85,11 @@ impl Shadows {
             return Vec::new();
         }
         // Nothing is nearer than the highest treetop is below the eye.
-        let clear = eye.position[2] - highest;
-        let near = (0.02 * plan.shadow_distance).min(5.0).max(clear).min(0.5 * plan.shadow_distance);
+        let clear = (eye.position[2] - highest).clamp(0.0, 0.5 * plan.shadow_distance);
+        let near = (0.02 * plan.shadow_distance).min(5.0).max(clear);
         let s = &scene.settings;
         let (count, split) = (plan.cascades, f64::from(s.cascade_split));
-        super::cascades::cascades(eye, sun, near, plan.shadow_distance, count, split, s.cascade_size)
+        super::cascades::cascades(eye, sun, (clear, near, plan.shadow_distance), count, split, s.cascade_size)
     }
 
     /// Records the pass.

@@ -49,6 +49,7 @@ impl Trees {
                     (6, u32::from(plan.cascades > 0)),
                     (7, u32::from(magnified)),
                     (8, u32::from(converged)),
+                    (9, plan.transfer_bands),
                     (12, plan.view_mode as u32),
                 ],
             })
@@ -87,6 +88,8 @@ impl Trees {
                 ("bases", Resource::Buffer(&forest.species.bases)),
                 ("masks", Resource::Buffer(&forest.species.masks)),
                 ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
+                ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
+                ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
                 ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
             ];
             for (k, program) in self.programs.iter().enumerate() {

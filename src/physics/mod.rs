@@ -8,5 +8,6 @@ pub mod shadow;
 pub mod tables;
 pub mod terrain;
 pub mod tonemap;
+pub mod transfer;
 pub mod views;
 pub mod zfield;

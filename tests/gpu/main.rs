@@ -20,6 +20,7 @@ mod shader_map;
 mod silhouettes;
 mod soak;
 mod tables;
+mod transfer;
 mod tree;
 mod views;
 mod zfield;

@@ -223,14 +223,17 @@ fn a_plan_beyond_the_budget_is_refused_with_its_largest_items() {
 fn without_a_sun_there_is_no_light_ray_and_no_average_of_its_light() {
     let gpu = device::open();
     let mut scene = scene();
+    scene.settings.set("transfer_bands", 2.0).unwrap();
     let unreduced = planned(&gpu, &scene, Representation::Auto);
     let (day, _) = drawn(&gpu, &scene, unreduced.clone());
+    assert!(day.has("light transfer of a") && day.bytes("light transfer") > 30_000);
     assert!(day.has("light ray of trees") && day.has("pair tables of a") && day.has("trees magnified"));
     scene.sun.irradiance = [0.0; 3];
     let (overcast, reduced) = drawn(&gpu, &scene, planned(&gpu, &scene, Representation::Auto));
     assert!(!overcast.has("light ray of trees") && !overcast.has("pair tables of a"));
     assert!(overcast.has("view tables of a") && overcast.has("trees magnified") && overcast.draws("trees"));
-    // Two texels stand for the tables that nobody reads.
+    // One texel a band stands for the transfer that nobody reads, and two for the tables.
+    assert!(!overcast.has("light transfer of a") && overcast.bytes("light transfer") < 1 << 14);
     let [with, without] = [&day, &overcast].map(|d| d.bytes("pair tables"));
     assert!(without <= 1024 && with >= 6 * 6 * 18 * 8, "{with} {without}");
     assert!(overcast.planned < day.planned);

@@ -5,7 +5,7 @@ use bytemuck::Pod;
 use super::{Finding, finding, law};
 use crate::Result;
 use crate::gpu::{Gpu, Resource, Shader, shaders};
-use crate::physics::{handover, hash, light, masks, tonemap};
+use crate::physics::{handover, hash, light, masks, tonemap, transfer};
 
 /// Up to twelve words in.
 pub type Arguments = [u32; 12];
@@ -32,6 +32,7 @@ pub enum Function {
     TableAngles,
     TableCoordinates,
     SelfShadow,
+    Transfer,
 }
 
 /// The results of a function for many arguments.
@@ -94,6 +95,7 @@ pub(super) const ALL: &[(&str, Probe)] = &[
     ("hotspot", hotspot),
     ("leaf-phase", leaf_phase),
     ("ground-contrast", ground_contrast),
+    ("light-transfer", light_transfer),
     ("hand-over", hand_over),
     ("display-curve", display_curve),
     ("covered-samples", covered_samples),
@@ -219,6 +221,30 @@ fn ground_contrast(gpu: &Gpu) -> Result<Finding> {
     // A difference, a product and a difference of numbers up to 5.
     compare(gpu, Function::GroundContrast, &inputs, |x| {
         vec![(light::ground_contrast(x[0], x[1], x[2]), 15.0 * EPS)]
+    })
+}
+
+fn light_transfer(gpu: &Gpu) -> Result<Finding> {
+    // Texels that change nothing, of darkness and of the largest coefficients, and others, under suns all over the sky.
+    let mut stream = hash::Stream::new(16);
+    let mut texels = vec![[128; 8], [0; 8], [255; 8]];
+    texels.extend((0..64).map(|_| std::array::from_fn(|_| (stream.bits() >> 24) as u8)));
+    let inputs: Vec<Vec<f32>> = texels
+        .iter()
+        .zip(pairs().iter().cycle())
+        .map(|(texel, sun)| {
+            let sampled = texel.map(|b| f32::from(b) / 255.0);
+            sampled.into_iter().chain([sun[0], sun[1], sun[2].abs(), 1.5 * sun[1].abs()]).collect()
+        })
+        .collect();
+    compare(gpu, Function::Transfer, &inputs, |x| {
+        let bytes = |k: usize| std::array::from_fn(|i| (255.0 * x[k + i]).round() as u8);
+        let bands = [transfer::decode(bytes(0)), transfer::decode(bytes(4))];
+        // A coefficient is a difference of 8 and 4 at most, 12 roundings of 1; eight of them times terms of at most 1, and
+        // seven sums of at most 32.
+        // The reach's exponential has 4 ulp of 1, times 16 that coefficients make at most.
+        let error = (8.0 * 12.0 + 7.0 * 32.0 + 16.0 * 12.0) * EPS;
+        vec![(transfer::transfer(&bands, [x[8], x[9], x[10]], transfer::reach(x[11])), error)]
     })
 }
 

@@ -82,9 +82,10 @@ pub const ALL: &[SceneCase] = &[
     SceneCase { name: "one-cascade", knobs: &[("cascades", 1.0)], ..ABOVE },
     SceneCase {
         name: "accurate-rays",
-        knobs: &[("view_iterations", 3.0), ("light_iterations", 2.0)],
+        knobs: &[("view_iterations", 3.0), ("light_iterations", 2.0), ("transfer_bands", 2.0)],
         ..GROVE
     },
+    SceneCase { name: "light-transfer", knobs: &[("transfer_bands", 1.0)], ..GROVE },
     SceneCase { name: "mode-fractions", mode: ViewMode::Fractions, ..GROVE },
     SceneCase { name: "mode-coverage", mode: ViewMode::Coverage, ..ABOVE },
     SceneCase { name: "mode-lod", mode: ViewMode::Lod, ..HILLS },
