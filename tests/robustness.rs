@@ -200,7 +200,8 @@ fn a_killed_bake_leaves_a_cache_that_works() {
             break;
         }
         assert_eq!(status.signal(), Some(9), "{status:?}");
-        pause += std::time::Duration::from_millis(80);
+        // By a quarter more each time: a slow bake must not take a hundred runs.
+        pause = pause * 5 / 4 + std::time::Duration::from_millis(20);
     }
     let bake = |cache: &Path| {
         let out = program().env("CANOPY_CACHE", cache).args(words(BAKE)).arg("--json").output().unwrap();

@@ -67,7 +67,7 @@ pub fn folder() -> PathBuf {
 
 /// What makes a scene coarse, small and so quick to bake and draw.
 const SMALL: &str = "\n[quality]\npreset = \"fast\"\nview_rings = 2\nview_resolution = 32\nocclusion_rays = 8\n\
-                     cascade_size = 256\ncoverage_size = 64\n\
+                     cascade_size = 256\ncoverage_size = 64\nzfield_min_pixels = 4\n\
                      table_angles = 6\ntable_densities = 3\ntable_rays = 64\n";
 
 /// A scene from text, with coarse views and small shadow maps so that it is quick to bake and draw.

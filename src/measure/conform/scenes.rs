@@ -109,7 +109,7 @@ impl SceneCase {
              [sky]\nradiance = {:?}\n\
              [[camera]]\nname = \"c\"\nposition = {position:?}\ntarget = {target:?}\nvertical_fov = {fov:?}\n\
              [quality]\npreset = \"fast\"\nview_rings = 4\nview_resolution = 64\nocclusion_rays = 16\ncascade_size = 256\n\
-             coverage_size = 64\ntable_angles = 8\ntable_densities = 4\ntable_rays = 128\n",
+             coverage_size = 64\nzfield_min_pixels = 4.0\ntable_angles = 8\ntable_densities = 4\ntable_rays = 128\n",
             self.name, self.ground, self.sky
         );
         let mut scene = scene::parse(&text, Path::new(self.name))?;

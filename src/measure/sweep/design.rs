@@ -249,9 +249,9 @@ mod tests {
         let all: Vec<String> = one_at_a_time(&bases(), &two).unwrap().iter().map(names).collect();
         let moved = ["balanced view_rings=4", "balanced view_rings=6", "balanced samples=1"];
         assert_eq!(all, [&["balanced", "fast", "accurate"][..], &moved].concat());
-        // The preset `accurate` has more samples.
+        // The preset `accurate` has more rings and samples.
         let finest = most_accurate(&bases(), &two).unwrap();
-        assert_eq!((finest.view_rings, finest.samples), (9, 8));
+        assert_eq!((finest.view_rings, finest.samples), (12, 8));
         assert_eq!([two[0].label(), some(&["samples"])[0].label()], ["view_rings=4/6/9", "samples"]);
         assert!(knobs(&["samples=few".into()]).is_err());
     }
