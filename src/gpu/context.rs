@@ -1,5 +1,6 @@
 //! Instance, device, queue, allocator, validation.
 
+use std::collections::BTreeMap;
 use std::ffi::{CStr, CString, c_void};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -78,6 +79,8 @@ pub(super) struct Shared {
     pub retired: Mutex<Vec<(u64, Retired)>>,
     /// The device's heaps and memory types.
     pub memory: vk::PhysicalDeviceMemoryProperties,
+    /// Live pipelines by the name of their last shader.
+    pub pipelines: Mutex<BTreeMap<&'static str, u32>>,
     /// Bytes of live allocations by heap.
     pub heap_bytes: Mutex<[u64; vk::MAX_MEMORY_HEAPS]>,
     pub samplers: Vec<vk::Sampler>,
@@ -217,6 +220,11 @@ impl Gpu {
             .unwrap_or_default();
         all.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
         all
+    }
+
+    /// Live pipelines: paths of their last shaders under `shaders/`, each with how many there are.
+    pub fn pipelines(&self) -> Vec<(&'static str, u32)> {
+        lock(&self.shared.pipelines).iter().map(|(name, count)| (*name, *count)).collect()
     }
 
     /// Bytes that live buffers and images hold in each heap, by the heap's number and kind.
@@ -365,6 +373,7 @@ fn open(
         let mut shared = Shared {
             timing: TimingState { calibration, valid_bits, ..TimingState::default() },
             memory: instance.get_physical_device_memory_properties(physical),
+            pipelines: Mutex::default(),
             heap_bytes: Mutex::new([0; vk::MAX_MEMORY_HEAPS]),
             push: khr::push_descriptor::Device::new(&instance, &device),
             names: debug_utils.then(|| ext::debug_utils::Device::new(&instance, &device)),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::context::{Gpu, Shared, device_error};
+use super::context::{Gpu, Shared, device_error, lock};
 use super::memory::Retired;
 use super::{Binding, Shader};
 use crate::{Error, Result};
@@ -115,6 +115,7 @@ impl Gpu {
         });
         program.pipeline = made.map_err(device_error(shader.name))?[0];
         self.shared.name(program.pipeline, shader.name);
+        *lock(&self.shared.pipelines).entry(program.name).or_default() += 1;
         Ok(program)
     }
 
@@ -178,6 +179,7 @@ impl Gpu {
         });
         program.pipeline = made.map_err(device_error(d.frag.name))?[0];
         self.shared.name(program.pipeline, d.frag.name);
+        *lock(&self.shared.pipelines).entry(program.name).or_default() += 1;
         Ok(program)
     }
 
@@ -262,6 +264,15 @@ impl Program {
 
 impl Drop for Program {
     fn drop(&mut self) {
+        if self.pipeline != vk::Pipeline::null() {
+            let mut live = lock(&self.shared.pipelines);
+            let left = live.get(self.name).map_or(0, |n| n - 1);
+            if left == 0 {
+                live.remove(self.name)
+            } else {
+                live.insert(self.name, left)
+            };
+        }
         self.shared.retire(Retired::Program(self.pipeline, self.layout, self.set));
     }
 }

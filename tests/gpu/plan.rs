@@ -26,6 +26,7 @@ struct Drawn {
     items: Vec<String>,
     passes: Vec<String>,
     allocated: Vec<(String, u64)>,
+    pipelines: Vec<&'static str>,
     planned: u64,
 }
 
@@ -49,6 +50,7 @@ fn drawn(gpu: &Gpu, scene: &Scene, plan: Plan) -> (Drawn, Picture) {
         items: plan.items.iter().filter(|i| i.kind != "pass").map(|i| i.name.clone()).collect(),
         passes,
         allocated: gpu.memory_report(),
+        pipelines: gpu.pipelines().into_iter().map(|p| p.0).collect(),
         planned: plan.bytes(),
     };
     (drawn, renderer.picture().unwrap())
@@ -90,6 +92,11 @@ impl Drawn {
         self.passes.iter().any(|p| p == pass)
     }
 
+    /// Whether a pipeline was made whose last shader is this, or lies in this folder.
+    fn builds(&self, shader: &str) -> bool {
+        self.pipelines.iter().any(|p| p.starts_with(shader))
+    }
+
     /// Bytes of the allocations of a name.
     fn bytes(&self, name: &str) -> u64 {
         self.allocated.iter().filter(|(n, _)| n == name).map(|(_, b)| b).sum()
@@ -107,6 +114,9 @@ fn without_a_sun_there_are_no_shadows() {
         scene.sun.irradiance = [irradiance; 3];
         let night = draw(&gpu, &scene);
         assert!(!night.has("shadow cascades") && !night.draws("shadows"));
+        for shader in ["frame/terrain_shadow.frag", "frame/tree_shadow.frag"] {
+            assert!(day.builds(shader) && !night.builds(shader), "{shader}: {:?}", night.pipelines);
+        }
         // One texel stands for the map that nobody reads.
         assert!(night.bytes("shadow cascades") < 1 << 16 && night.bytes("shadow depth") == 0);
         assert!(night.planned < day.planned);
@@ -144,6 +154,11 @@ fn without_trees_there_is_no_forest() {
     for bare in [thinned, draw(&gpu, &scene)] {
         assert!(!tree_passes.iter().any(|p| bare.draws(p)), "{:?}", bare.passes);
         assert!(!tree_items.iter().any(|p| bare.has(p)), "{:?}", bare.items);
+        for shader in ["forest/", "frame/tree", "frame/shader_map"] {
+            let tiles = |p: &&str| !p.starts_with("forest/terrain") && p.starts_with(shader);
+            assert!(forest.pipelines.iter().any(|p| tiles(&p)), "{:?}", forest.pipelines);
+            assert!(!bare.pipelines.iter().any(|p| tiles(&p)), "{:?}", bare.pipelines);
+        }
         let names = [
             "seeds",
             "trees",
@@ -250,10 +265,12 @@ fn level_ground_is_one_tile_without_slopes() {
     assert!(plan.terrain_tiles > 1 && plan.height_tiles == 1);
     let (level, reduced) = drawn(&gpu, &scene, plan.clone());
     assert!(!level.draws("terrain tiles") && !level.has("height map"));
+    assert!(!level.builds("forest/terrain_tile.comp"), "{:?}", level.pipelines);
     assert!(reduced == picture(&gpu, &scene, Plan { height_tiles: plan.terrain_tiles, ..plan }));
     hills(&mut scene);
     let relief = draw(&gpu, &scene);
     assert!(relief.draws("terrain tiles") && relief.has("height map"));
+    assert!(relief.builds("forest/terrain_tile.comp"), "{:?}", relief.pipelines);
     for name in ["slope tiles", "height tiles"] {
         assert!(level.bytes(name) > 0 && relief.bytes(name) > 500 * level.bytes(name), "{name}");
     }
@@ -288,6 +305,9 @@ fn from_afar_no_tree_is_drawn_by_itself() {
         }
         for pass in ["seeds", "cull", "prefix sums", "draw commands", "compact", "trees"] {
             assert!(with.draws(pass) && !without.draws(pass), "{pass}");
+        }
+        for shader in ["forest/cull.comp", "forest/scan.comp", "forest/compact.comp", "frame/tree"] {
+            assert!(with.builds(shader) && !without.builds(shader), "{shader}: {:?}", without.pipelines);
         }
         for item in ["coverage tiles", "shader-map nodes", "view tables of a", "pair tables of a"] {
             assert!(without.has(item), "{item}");
