@@ -156,8 +156,8 @@ fn without_trees_there_is_no_forest() {
         assert!(!tree_items.iter().any(|p| bare.has(p)), "{:?}", bare.items);
         for shader in ["forest/", "frame/tree", "frame/shader_map"] {
             let tiles = |p: &&str| !p.starts_with("forest/terrain") && p.starts_with(shader);
-            assert!(forest.pipelines.iter().any(|p| tiles(p)), "{:?}", forest.pipelines);
-            assert!(!bare.pipelines.iter().any(|p| tiles(p)), "{:?}", bare.pipelines);
+            assert!(forest.pipelines.iter().any(tiles), "{:?}", forest.pipelines);
+            assert!(!bare.pipelines.iter().any(tiles), "{:?}", bare.pipelines);
         }
         let names = [
             "seeds",
