@@ -110,11 +110,7 @@ impl Occlusion {
             let normal = if solid[face.material as usize] { normal } else { Vec3::ZERO };
             let tries = (DENSITY * area).ceil().clamp(1.0, 65536.0) as u32;
             for k in 0..tries {
-                // The plane's additive recurrence, folded into the triangle.
-                let (s, t) = ((0.5 + k as f32 * 0.754_877_7).fract(), (0.5 + k as f32 * 0.569_840_3).fract());
-                let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
-                let uv = face.uv[0] * (1.0 - s - t) + face.uv[1] * s + face.uv[2] * t;
-                if surface.opaque(face, uv) {
+                if let Some((s, t)) = surface.spread(face, k) {
                     let p = a + (b - a) * s + (c - a) * t;
                     found.push((self.corners(p)[0].0, Point { p, normal }));
                 }

@@ -151,6 +151,15 @@ impl Surface {
         Ok(Surface { frame, faces, masks })
     }
 
+    /// Point `k` of an even sequence over a face, as (s, t) of a + s (b − a) + t (c − a), unless there is a hole: the plane's
+    /// additive recurrence, folded into the triangle.
+    pub fn spread(&self, face: &Face, k: u32) -> Option<(f32, f32)> {
+        let (s, t) = ((0.5 + k as f32 * 0.754_877_7).fract(), (0.5 + k as f32 * 0.569_840_3).fract());
+        let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
+        let uv = face.uv[0] * (1.0 - s - t) + face.uv[1] * s + face.uv[2] * t;
+        self.opaque(face, uv).then_some((s, t))
+    }
+
     /// Whether the face is there at the texture coordinates, rather than a hole in it.
     #[inline]
     pub fn opaque(&self, face: &Face, uv: Vec2) -> bool {

@@ -17,10 +17,11 @@ use super::raster::{NO_FACE, Raster, SUBSAMPLES, View};
 use super::rays::Rays;
 use super::surface::Surface;
 use super::tables::{Crown, FieldAim, FieldCrown, Shape};
+use super::views::rasters;
 use super::{SpeciesBake, Transfer};
 use crate::physics::light;
 use crate::physics::transfer::{self, TERMS};
-use crate::physics::views::{self, Basis};
+use crate::physics::views;
 use crate::progress::Progress;
 use crate::scene::Mesh;
 
@@ -116,14 +117,7 @@ impl Points {
                 let area = 0.5 * (b - a).cross(c - a).length() / frame.radius.powi(2);
                 let tries =
                     ((POINTS * resolution as f32).powi(2) * area).ceil().clamp(1.0, MOST as f32) as u32;
-                let on = |k: u32| {
-                    // The plane's additive recurrence, folded into the triangle.
-                    let (s, t) =
-                        ((0.5 + k as f32 * 0.754_877_7).fract(), (0.5 + k as f32 * 0.569_840_3).fract());
-                    let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
-                    let uv = face.uv[0] * (1.0 - s - t) + face.uv[1] * s + face.uv[2] * t;
-                    surface.opaque(face, uv).then(|| a + (b - a) * s + (c - a) * t)
-                };
+                let on = |k: u32| surface.spread(face, k).map(|(s, t)| a + (b - a) * s + (c - a) * t);
                 let free = |at: Vec3, sun: &Sun| !rays.occluded(at, sun.to, 1e-4 * frame.half_height);
                 let lit = |at: Vec3| suns.iter().enumerate().map(|(k, s)| u64::from(free(at, s)) << k).sum();
                 (0..tries).filter_map(on).map(|at| Point { at, lit: lit(at) }).collect()
@@ -194,24 +188,14 @@ pub fn draw(mesh: &Mesh, surface: &Surface, bake: &SpeciesBake, bands: u32, quie
     let scatter = Scatter::new(mesh, surface, bake);
     let n = bake.views.n;
     let progress = Progress::new("baking light transfer", u64::from(views::count(n)), quiet);
-    let pairs: Vec<_> = views::pairs(n).collect();
     // By view, band and level.
-    let layers: Vec<Vec<Vec<Vec<u8>>>> = pairs
-        .par_iter()
-        .map_init(
-            || Raster::new(resolution),
-            |raster, &(i, j)| {
-                let view = View::new(&Basis::new(views::direction(n, i, j)), resolution);
-                raster.draw(surface, &view);
-                // Parallel rays of the scaled space along w are parallel to S w.
-                let eye = (view.w * surface.frame.scale()).normalize();
-                let shown = show(raster, (&view, eye), (surface, bake, &field), &suns, (&points, &scatter));
-                let texels = texels(shown, eye, &suns, TERMS * bands as usize);
-                progress.step(1);
-                (0..bands as usize).map(|band| mips(&texels, band, resolution as usize)).collect()
-            },
-        )
-        .collect();
+    let layers: Vec<Vec<Vec<Vec<u8>>>> = rasters(surface, n, resolution, &progress, |raster, view| {
+        // Parallel rays of the scaled space along w are parallel to S w.
+        let eye = (view.w * surface.frame.scale()).normalize();
+        let shown = show(raster, (view, eye), (surface, bake, &field), &suns, (&points, &scatter));
+        let texels = texels(shown, eye, &suns, TERMS * bands as usize);
+        (0..bands as usize).map(|band| mips(&texels, band, resolution as usize)).collect()
+    });
     progress.finish();
     let level = |band: usize, l: usize| layers.iter().flat_map(|v| v[band][l].iter().copied()).collect();
     let levels = |band| (0..=resolution.ilog2() as usize).map(|l| level(band, l)).collect();

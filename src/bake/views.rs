@@ -16,6 +16,25 @@ pub fn encode_depth(d: f32) -> f32 {
     (d + SQRT_2) / (2.0 * SQRT_2)
 }
 
+/// Rasters of all views of a surface, and what is made `of` each, in the order of the layers.
+pub fn rasters<T: Send>(
+    surface: &Surface,
+    n: u32,
+    resolution: u32,
+    progress: &Progress,
+    of: impl Fn(&Raster, &View) -> T + Sync,
+) -> Vec<T> {
+    let pairs: Vec<_> = views::pairs(n).collect();
+    let draw = |raster: &mut Raster, &(i, j): &(i32, i32)| {
+        let view = View::new(&Basis::new(views::direction(n, i, j)), resolution);
+        raster.draw(surface, &view);
+        let made = of(raster, &view);
+        progress.step(1);
+        made
+    };
+    pairs.par_iter().map_init(|| Raster::new(resolution), draw).collect()
+}
+
 /// All views of a surface. Each view depends on nothing but the surface: the same bits for any number of threads.
 pub fn draw(
     surface: &Surface,
@@ -24,20 +43,9 @@ pub fn draw(
     resolution: u32,
     progress: &Progress,
 ) -> ZField {
-    let pairs: Vec<_> = views::pairs(n).collect();
-    let layers: Vec<Vec<Vec<u8>>> = pairs
-        .par_iter()
-        .map_init(
-            || Raster::new(resolution),
-            |raster, &(i, j)| {
-                let view = View::new(&Basis::new(views::direction(n, i, j)), resolution);
-                raster.draw(surface, &view);
-                let levels = mips(resolve(raster, &view, occlusion), resolution);
-                progress.step(1);
-                levels
-            },
-        )
-        .collect();
+    let layers: Vec<Vec<Vec<u8>>> = rasters(surface, n, resolution, progress, |raster, view| {
+        mips(resolve(raster, view, occlusion), resolution)
+    });
     let count = resolution.ilog2() as usize + 1;
     let levels = (0..count)
         .map(|level| {
