@@ -41,7 +41,6 @@ struct View {
     float hotspot_width;              // a2 of BN12 eq. 8, 1/rad
     float ground_contrast;            // a3 of BN12 eq. 10
     float convergence;                // distance over the range from which light is the average, BN12 eq. 22-25
-    float hole_radius;                // radius of the hole around a tree times sqrt(density), BN12 eq. 9
     float silhouette_reach;           // range of trees on silhouettes over that of others: 1 without relief
     float silhouette_step;            // first distance from a tree at which its sight line is compared with the ground, m
     float height_cell;                // metres a texel of the height map
@@ -76,6 +75,8 @@ struct Species {
     float leaf_shadow;                // c of the crown's self-shadow, 1/sqrt(rad)
     vec3 albedo;                      // of what is seen of a crown, for the sky's light
     float turning;                    // change of the reflectance with the phase angle, 1/rad
+    vec2 sky;                         // factor of the sky's light on a crown from the side, and its change with the cosine of the view's zenith angle
+    float hole;                       // 1 / squared radius of the hole around a tree, over the density: BN12 eq. 9
 };
 
 // Rows of the projection of scaled tree space into one z-field view.

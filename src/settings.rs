@@ -93,8 +93,8 @@ knobs! {
     terrain_pixels: f32, "px", 1.0..=64.0, [12.0, 8.0, 4.0], draw [20.0, 12.0, 8.0, 4.0, 2.0], "size of a terrain mesh cell on the screen; vertices grow with the inverse square";
     hotspot_amplitude: f32, "", 0.0..=1.0, [0.0, 0.0, 0.0], draw [], "a1 of a hotspot (BN12, eq. 8: 0.2) on top of the one that is measured from each mesh";
     hotspot_width: f32, "1/rad", 0.0..=1000.0, [20.0, 20.0, 20.0], draw [], "a2 of that hotspot (BN12, eq. 8)";
-    ground_contrast: f32, "", 0.0..=4.0, [1.0, 1.0, 1.0], draw [], "a3: how much darker the ground is under trees than between them (BN12, eq. 10)";
-    hole_radius: f32, "", 0.1..=10.0, [2.0, 2.0, 2.0], draw [], "radius of the hole around a tree times the square root of the density (BN12, eq. 9: 2; Poisson points: 0.5)";
+    ground_contrast: f32, "", 0.0..=4.0, [0.3, 0.3, 0.3], draw [1.0, 0.3], "a3: how much darker the ground is under trees than between them (BN12, eq. 10)";
+    hole_radius: f32, "", 0.0..=10.0, [0.0, 0.0, 0.0], bake [2.0, 0.0], "radius of the hole around a tree that sky comes through, times the square root of the density (BN12, eq. 9: 2); 0: as measured from each mesh";
     table_angles: u32, "", 4..=32, [16, 16, 16], bake [8, 16, 24], "nodes of each angle in the tables of far trees; memory grows with the cube";
     table_densities: u32, "", 2..=16, [8, 8, 8], bake [4, 8, 16], "nodes of the density in the tables of far trees; memory";
     table_rays: u32, "", 32..=1048576, [1024, 2048, 8192], bake [512, 1024, 2048, 8192, 32768], "points on crowns that light in the tables of far trees is measured at, four to a ground point; error falls with the root, time grows in proportion";

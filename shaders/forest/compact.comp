@@ -51,16 +51,14 @@ uint lookup(vec3 w, out vec2 weights) {
 
 // The light of the average tree around this one, towards which its own converges with nu (BN12, eq. 22 and 23).
 void average_light(inout Tree t, Species kind, vec3 to_camera, vec3 ground, float density, float nu) {
-    TableAngles a = table_angles(to_camera, view.v.sun_direction, ground, kind.vertical_scale);
-    vec3 at = table_coordinates(a, TABLE_ANGLES);
-    float x = table_density(density * kind.mean_area * a.up, kind.max_thickness, TABLE_DENSITIES);
-    vec4 sky = table_view(view_table, at.z, x, float(t.species), TABLE_ANGLES, TABLE_DENSITIES);
-    vec3 sun = vec3(0.0);
-    if (PAIR_TABLES) sun = table_pair(pair_table, at, x, float(t.species), TABLE_ANGLES, TABLE_DENSITIES);
+    TableForest f = table_forest(pair_table, view_table, to_camera, view.v.sun_direction, ground, kind.vertical_scale,
+                                 density * kind.mean_area, kind.max_thickness, float(t.species), TABLE_ANGLES,
+                                 TABLE_DENSITIES, PAIR_TABLES);
+    float lit = nu * sun_facing(view.v.sun_direction, ground);
     t.own = 1.0 - nu;
-    t.mean_sun = (nu * a.sun_facing) * t.sun * (sun.y + sun.z * kind.bark);
-    t.mean_lit = nu * a.sun_facing * (sun.y + sun.z);
-    t.mean_sky = nu * t.sky * (sky.y + sky.z * kind.bark);
+    t.mean_sun = (lit * f.transfer) * t.sun * (f.sun.x + f.sun.y * kind.bark);
+    t.mean_lit = lit * (f.sun.x + f.sun.y);
+    t.mean_sky = nu * t.sky * (f.sky.x + f.sky.y * kind.bark);
 }
 
 // Opacity factor of a tree: faded out at its range, or on a silhouette, at the farther one.
@@ -108,8 +106,10 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     t.sun = tint * phase * hotspot(to_camera, v.sun_direction, v.hotspot_amplitude, v.hotspot_width) * v.sun_irradiance;
     // rho / 2 of a leaf that the upper hemisphere lights, times the visibility of the sky above a slope (BN12, eq. 9).
     t.sky = tint * kind.albedo * (0.25 * (1.0 + ground.z)) * v.sky_radiance;
-    t.hole = density / (v.hole_radius * v.hole_radius);
+    t.hole = density * kind.hole;
     average_light(t, kind, to_camera, ground, density, converged(reach, v.convergence));
+    // From above more of the leaves' upper sides is seen, which the sky lights. The tables' average knows.
+    t.sky *= max(kind.sky.x + kind.sky.y * to_camera.z, 0.0);
     t.cascade = cascade_at(v.cascade_far, v.cascade_count, distance);
     return t;
 }

@@ -28,31 +28,28 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
     for (uint k = 0u; k < SPECIES_COUNT; k++) {
         Species s = species.items[k];
         float share = thickness[k] / (s.mean_area * density);
-        TableAngles a = table_angles(v, view.v.sun_direction, n, s.vertical_scale);
-        float x = density * s.mean_area * a.up;
-        float at_x = table_density(x, s.max_thickness, TABLE_DENSITIES);
-        vec3 at = table_coordinates(a, TABLE_ANGLES);
-        vec4 t = table_view(view_table, at.z, at_x, float(k), TABLE_ANGLES, TABLE_DENSITIES);
-        float level = table_density(density * s.mean_area, s.max_thickness, TABLE_DENSITIES);
-        vec2 g = table_ground(view_table, level, float(k), TABLE_ANGLES, TABLE_DENSITIES);
-        float path = share * x * a.sec_v * t.x, reach = distance / s.range, part = path * handed_over(reach);
+        float x = density * s.mean_area;
+        TableForest t = table_forest(pair_table, view_table, v, view.v.sun_direction, n, s.vertical_scale, x, s.max_thickness,
+                                     float(k), TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES);
+        vec2 g = table_ground(view_table, table_density(x, s.max_thickness, TABLE_DENSITIES), float(k), TABLE_ANGLES, TABLE_DENSITIES);
+        float path = share * t.seen, reach = distance / s.range, part = path * handed_over(reach);
         f.seen += path;
         f.over += part;
         f.converged += path * converged(reach, view.v.convergence);
-        f.seen_coverage += share * t.w;
+        f.seen_coverage += share * t.coverage;
         f.sky -= share * log(max(g.x, 1e-6));
         f.gap -= share * log(max(1.0 - g.y, 1e-6));
         // Where nothing is handed over yet no tree is shown, but the mix must stay defined.
         float weight = max(part, 1e-6 * path);
         vec3 leaf = (0.25 * (1.0 + n.z)) * s.albedo * view.v.sky_radiance;
-        f.tree_sky += weight * leaf * (t.y + t.z * s.bark);
+        f.tree_sky += weight * leaf * (t.sky.x + t.sky.y * s.bark);
         if (PAIR_TABLES) {
-            vec3 p = table_pair(pair_table, at, at_x, float(k), TABLE_ANGLES, TABLE_DENSITIES);
-            f.joint += max(share * x * (a.sec_v + a.sec_l) * p.x, path);
+            f.joint += share * t.joint;
             vec3 lit = turned_reflectance(s.reflectance, s.turning, angle_between(v, view.v.sun_direction));
             vec3 full = leaf_phase(v, view.v.sun_direction, lit, s.transmittance) * view.v.sun_irradiance;
-            f.tree_sun += weight * a.sun_facing * full * (p.y + p.z * s.bark);
-            f.tree_lit += weight * a.sun_facing * (p.y + p.z);
+            weight *= sun_facing(view.v.sun_direction, n);
+            f.tree_sun += weight * t.transfer * full * (t.sun.x + t.sun.y * s.bark);
+            f.tree_lit += weight * (t.sun.x + t.sun.y);
         }
     }
     float inverse = 1.0 / max(f.over, 1e-6 * f.seen);

@@ -16,14 +16,15 @@ uint cascade_at(vec4 far, uint count, float distance) {
 // Which of four casters leave the sun to points at the depths.
 vec4 caster_visibility(vec4 casters, vec4 depths) { return vec4(lessThanEqual(casters, depths)); }
 
-// Bilinear blend over the four texels around a position in [-1, 1]^2; lit outside. Casters are drawn at the texels' centres:
+// Bilinear blend over the four texels around a position in [-1, 1]^2; lit outside, and behind the far side, where casters' depths
+// are cut off at 0, by what is before it. Casters are drawn at the texels' centres:
 // the ground goes on to there with its gradient, so its depth to compare with is the plane's there. Crowns are round: 0.
 float sun_visibility(sampler2DArray map, vec3 at, vec2 gradient, uint cascade) {
     float side = float(textureSize(map, 0).x);
     vec2 t = (at.xy * 0.5 + 0.5) * side - 0.5;
     vec2 cell = floor(t), f = t - cell;
     vec2 step = gradient * (2.0 / side);
-    vec4 depths = at.z + step.x * (vec4(0.0, 1.0, 1.0, 0.0) - f.x) + step.y * (vec4(1.0, 1.0, 0.0, 0.0) - f.y);
+    vec4 depths = max(at.z + step.x * (vec4(0.0, 1.0, 1.0, 0.0) - f.x) + step.y * (vec4(1.0, 1.0, 0.0, 0.0) - f.y), 0.0);
     // Gathered at the corner that the four texels share, so that they are the ones that f weighs.
     vec4 lit = caster_visibility(textureGather(map, vec3((cell + 1.0) / side, float(cascade))), depths);
     vec2 along = mix(lit.wx, lit.zy, f.x);

@@ -6,30 +6,32 @@
 
 const float TABLE_MAX_ANGLE = 1.5358897417550099; // 88 degrees
 
-// Zenith angles of viewer and light and their relative azimuth about n, all in scaled space (BN12, eq. 2-4): S scales
-// the vertical by k, which makes crowns spheres. Where an angle is 0 there is no azimuth: 0 then.
+// 1 where the sun is above the slope's horizon, smoothly 0 within two degrees of it.
+float sun_facing(vec3 l, vec3 n) { return smoothstep(0.0, 0.0349, dot(l, n)); }
+
+// Zenith angles of viewer and light and their relative azimuth in scaled space (BN12, eq. 2-4): S scales the vertical
+// by k, which makes crowns spheres. Where an angle is 0 there is no azimuth: 0 then.
 struct TableAngles {
     float v, l, phi;
     float sec_v, sec_l;
-    float up;         // u(S^-1 n) . u_z, the factor of the density (BN12, eq. 5)
-    float sun_facing; // 1 where the sun is above the slope's horizon, smoothly 0 within two degrees of it
+    float length_v, length_l; // of what the vectors have become
 };
 
+// Over ground of unit normal n: sheared by what makes it level. Trees stay upright and where they are.
 TableAngles table_angles(vec3 v, vec3 l, vec3 n, float k) {
-    vec3 sv = normalize(vec3(v.xy, k * v.z)), sl = normalize(vec3(l.xy, k * l.z)), sn = normalize(vec3(k * n.xy, n.z));
-    float cos_v = dot(sv, sn), cos_l = dot(sl, sn);
+    float level = k / max(n.z, 1e-3);
+    vec3 sv = vec3(v.xy, level * dot(v, n)), sl = vec3(l.xy, level * dot(l, n));
     TableAngles a;
+    a.length_v = length(sv);
+    a.length_l = length(sl);
     // atan2 keeps its precision where acos loses it.
-    a.v = atan(length(cross(sv, sn)), cos_v);
-    a.l = atan(length(cross(sl, sn)), cos_l);
-    // Of the parts along the ground, which are the same to the bit where v = l.
-    vec3 pv = sv - cos_v * sn, pl = sl - cos_l * sn;
-    float along = dot(pv, pl);
-    a.phi = atan(length(cross(pv, pl)), along + (along >= 0.0 ? 1e-9 : -1e-9));
-    a.sec_v = 1.0 / max(cos_v, 1e-3);
-    a.sec_l = 1.0 / max(cos_l, 1e-3);
-    a.up = sn.z;
-    a.sun_facing = smoothstep(0.0, 0.0349, cos_l);
+    a.v = atan(length(v.xy), sv.z);
+    a.l = atan(length(l.xy), sl.z);
+    // The same to the bit where v = l.
+    float along = dot(v.xy, l.xy);
+    a.phi = atan(abs(v.x * l.y - v.y * l.x), along + (along >= 0.0 ? 1e-9 : -1e-9));
+    a.sec_v = 1.0 / max(sv.z / a.length_v, 1e-3);
+    a.sec_l = 1.0 / max(sl.z / a.length_l, 1e-3);
     return a;
 }
 
@@ -47,14 +49,14 @@ vec3 table_coordinates(TableAngles a, float n) {
 // Coordinate of an optical thickness x = lambda A in [0, m - 1].
 float table_density(float x, float x_max, float m) { return (m - 1.0) * sqrt(clamp(x / max(x_max, 1e-9), 0.0, 1.0)); }
 
-// (W, T of leaves, T of bark): trilinear in the angles, linear between two densities.
-vec3 table_pair(sampler3D pairs, vec3 at, float density, float species, float n, float m) {
+// (W, T of leaves, T of bark, light transfer): trilinear in the angles, linear between two densities.
+vec4 table_pair(sampler3D pairs, vec3 at, float density, float species, float n, float m) {
     float j = clamp(floor(density), 0.0, max(m - 2.0, 0.0));
     vec3 size = vec3(textureSize(pairs, 0));
     vec2 uv = (at.xy + 0.5) / size.xy;
     float slice = (species * m + j) * n + at.z + 0.5;
-    vec3 a = textureLod(pairs, vec3(uv, slice / size.z), 0.0).xyz;
-    vec3 b = textureLod(pairs, vec3(uv, (slice + (m > 1.0 ? n : 0.0)) / size.z), 0.0).xyz;
+    vec4 a = textureLod(pairs, vec3(uv, slice / size.z), 0.0);
+    vec4 b = textureLod(pairs, vec3(uv, (slice + (m > 1.0 ? n : 0.0)) / size.z), 0.0);
     return mix(a, b, density - j);
 }
 
@@ -66,4 +68,54 @@ vec4 table_view(sampler2DArray views, float at_v, float density, float species, 
 // (D, C): sky visibility of the ground, and expected coverage by discs, from column n.
 vec2 table_ground(sampler2DArray views, float density, float species, float n, float m) {
     return textureLod(views, vec3((n + 0.5) / (n + 1.0), (density + 0.5) / m, species), 0.0).xy;
+}
+
+// What is seen of a species' forest.
+struct TableForest {
+    float seen;     // optical path of the view: visible ground is exp of its negative
+    float joint;    // of view and light together, at least that: visible and lit ground
+    float coverage; // by discs, at visible ground
+    float transfer; // what light transfer makes of the sun's light, on average
+    vec2 sun;       // T of leaves and bark
+    vec2 sky;       // E of leaves and bark
+};
+
+// Mean of exp(-x t) over t in [0, 1].
+float mean_through(float x) { return x < 1e-2 ? 1.0 - x * (0.5 - x / 6.0) : (1.0 - exp(-x)) / x; }
+
+// Along v of trees of optical thickness x (density times area) on a slope of unit normal n. The tables are of level ground,
+// which a shear makes of the slope. It leaves how trees stand to each other, and changes crowns: what one crown by itself is
+// to v and l, at density 0, is put in place of what the shear makes of it, and where that lets less light through, or more,
+// so do the crowns before it. Nothing changes on level ground.
+TableForest table_forest(sampler3D pairs, sampler2DArray views, vec3 v, vec3 l, vec3 n, float k, float x, float x_max,
+                         float species, float count, float m, bool lit) {
+    TableAngles s = table_angles(v, l, n, k), u = table_angles(v, l, vec3(0.0, 0.0, 1.0), k);
+    float at_x = table_density(x, x_max, m);
+    vec3 at_s = table_coordinates(s, count), at_u = table_coordinates(u, count);
+    vec4 t = table_view(views, at_s.z, at_x, species, count, m);
+    vec4 ts = table_view(views, at_s.z, 0.0, species, count, m), tu = table_view(views, at_u.z, 0.0, species, count, m);
+    float view_path = (u.length_v * tu.x) / (s.length_v * ts.x);
+    TableForest f;
+    f.seen = x * s.sec_v * t.x * view_path;
+    f.joint = f.seen;
+    f.coverage = t.w;
+    f.transfer = 1.0;
+    f.sun = vec2(0.0);
+    f.sky = t.yz * ((tu.y + tu.z) / max(ts.y + ts.z, 1e-3));
+    if (lit) {
+        float to_nodes = (count - 1.0) / TABLE_MAX_ANGLE;
+        float ls = table_view(views, to_nodes * clamp(s.l, 0.0, TABLE_MAX_ANGLE), 0.0, species, count, m).x;
+        float lu = table_view(views, to_nodes * clamp(u.l, 0.0, TABLE_MAX_ANGLE), 0.0, species, count, m).x;
+        float light_path = (u.length_l * lu) / (s.length_l * ls);
+        vec4 p = table_pair(pairs, at_s, at_x, species, count, m);
+        vec4 ps = table_pair(pairs, at_s, 0.0, species, count, m), pu = table_pair(pairs, at_u, 0.0, species, count, m);
+        f.joint = max(x * (s.sec_v * view_path + s.sec_l * light_path) * p.x, f.seen);
+        // Of the sheared crowns.
+        float seen = x * s.sec_v * t.x, joint = max(x * (s.sec_v + s.sec_l) * p.x, seen);
+        float layer = (mean_through(f.joint) * mean_through(seen)) / (mean_through(joint) * mean_through(f.seen));
+        float change = layer * (pu.y + pu.z) / max(ps.y + ps.z, 1e-3);
+        f.sun = p.yz * min(change, 1.0 / max(p.y + p.z, 1e-6));
+        f.transfer = p.w * (pu.w / max(ps.w, 1e-3));
+    }
+    return f;
 }

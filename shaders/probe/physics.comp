@@ -67,7 +67,7 @@ void main() {
         case 13u: {
             TableAngles t = table_angles(a.xyz, b.xyz, c.xyz, a.w);
             r.a = floatBitsToUint(vec4(t.v, t.l, t.phi, t.sec_v));
-            r.b.xyz = floatBitsToUint(vec3(t.sec_l, t.up, t.sun_facing));
+            r.b = floatBitsToUint(vec4(t.sec_l, t.length_v, t.length_l, sun_facing(b.xyz, c.xyz)));
             break;
         }
         case 14u: {

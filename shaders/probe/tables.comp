@@ -27,7 +27,7 @@ void main() {
     if (k >= count) return;
     vec4 at = places.items[k].at;
     float species = places.items[k].species.x;
-    results.items[k] = Values(vec4(table_pair(pair_table, at.xyz, at.w, species, ANGLES, DENSITIES), 0.0),
+    results.items[k] = Values(table_pair(pair_table, at.xyz, at.w, species, ANGLES, DENSITIES),
                               table_view(view_table, at.z, at.w, species, ANGLES, DENSITIES),
                               vec4(table_ground(view_table, at.w, species, ANGLES, DENSITIES), 0.0, 0.0));
 }

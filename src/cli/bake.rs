@@ -192,7 +192,7 @@ fn forest(
     let x = f64::from(t.max_thickness);
     let sample = |degrees: f64| {
         let a = degrees.to_radians();
-        let [_, leaf, bark] = canopy::physics::tables::pair(&t, a, a, 0.0, x);
+        let [_, leaf, bark, _] = canopy::physics::tables::pair(&t, a, a, 0.0, x);
         [degrees, canopy::physics::tables::visible_ground(&t, a, x), leaf + bark]
     };
     Ok(Forest {

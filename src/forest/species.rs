@@ -245,6 +245,7 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Baked], maps: &[Option<Map>], view_
             extinction: bake.extinction,
             leaf_shadow: bake.leaf_shadow,
             albedo: bake.sky_albedo(),
+            sky: tables.sky,
             turning: bake.turned.slope_of(),
             transmittance,
             range: plan.species_range[k] as f32,
@@ -264,6 +265,7 @@ fn rows(scene: &Scene, plan: &Plan, baked: &[Baked], maps: &[Option<Map>], view_
             bark: std::array::from_fn(|i| bake.bark[i] / (reflectance[i] + transmittance[i]).max(1e-3)),
             mean_area: std::f32::consts::PI * bake.crown_radius.powi(2) * mean_squared_scale(species) as f32,
             vertical_scale: tables.vertical_scale,
+            hole: tables.hole,
             max_thickness: tables.max_thickness,
             listed_density: maps[k].as_ref().map_or(0.0, |m| m.listed as f32),
             ..bytemuck::Zeroable::zeroed()

@@ -9,7 +9,7 @@ use crate::{Error, Result};
 
 /// The tables of every species.
 pub struct TableData {
-    /// (W, T of leaves, T of bark): azimuth, light zenith, then view zenith within density within species.
+    /// (W, T of leaves, T of bark, M): azimuth, light zenith, then view zenith within density within species.
     pub pairs: Image,
     /// (V, E of leaves, E of bark, coverage at visible ground) by view zenith and density, and in the last column
     /// (D, C); a layer a species.
@@ -40,7 +40,7 @@ impl TableData {
             .iter()
             .filter(|_| with_pairs)
             .flat_map(|t| &t.pair)
-            .flat_map(|[w, leaf, bark]| [half(*w), half(*leaf), half(*bark), 0])
+            .flat_map(|values| values.map(half))
             .collect();
         texels.resize(4 * size.iter().product::<u32>() as usize, 0);
         gpu.upload_image(&pairs, 0, 0, 1, bytemuck::cast_slice(&texels))?;

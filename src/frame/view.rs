@@ -119,7 +119,6 @@ pub fn view(
     view.hotspot_amplitude = s.hotspot_amplitude;
     view.hotspot_width = s.hotspot_width;
     view.ground_contrast = s.ground_contrast;
-    view.hole_radius = s.hole_radius;
     view.convergence = s.convergence;
     view.silhouette_reach = plan.silhouette_reach as f32;
     view.silhouette_step = plan.tallest as f32;

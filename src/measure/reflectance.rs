@@ -28,7 +28,7 @@ const PLANE: f64 = 2400.0;
 /// Samples of the plane's height map along a side.
 const PLANE_SAMPLES: u32 = 25;
 /// Largest side of the patch's shadow map, texels.
-const LARGEST_SHADOW_MAP: f64 = 2048.0;
+const LARGEST_SHADOW_MAP: f64 = 4096.0;
 
 /// What to measure.
 #[derive(Clone, Debug)]
@@ -185,14 +185,15 @@ pub fn measure(
     // A pixel on the tree is as large as from the distance.
     let pixels_at_1m = optics.pixels_at_1m * away / request.distance;
     let scene_plan = Plan::new(scene, camera, size, false, Some(gpu.info()))?;
-    let widest = request.views.iter().map(|v| v[0].abs()).fold(0.0, f64::max);
-    // What the image shows, along the ground, and the trees around whose shadows fall into it.
-    let shown = method.side * (0.5 / widest.to_radians().cos().max(0.1) + 0.1) + 2.0 * scene_plan.tallest;
-    let texel =
-        shadow_texel(&patch, &scene_plan, &optics, request.distance).max(2.0 * shown / LARGEST_SHADOW_MAP);
-    let texels = (2.0 * shown / texel).max(64.0) as u32;
+    let finest = shadow_texel(&patch, &scene_plan, &optics, request.distance);
+    // Of one view: what the image shows, along the ground, and the trees around whose shadows fall into it.
+    let span = |view: &[f64; 2]| 2.0 * (shown(*view, request.slope, method.side) + 2.0 * scene_plan.tallest);
+    let widest = request.views.iter().map(span).fold(0.0, f64::max);
+    let texels = (widest / finest).clamp(64.0, LARGEST_SHADOW_MAP);
     patch.settings.cascades = 1;
-    patch.settings.cascade_size = texels.next_power_of_two();
+    patch.settings.cascade_size = (texels as u32).next_power_of_two();
+    let texel = |view: &[f64; 2]| finest.max(span(view) / f64::from(patch.settings.cascade_size));
+    let texels: Vec<f64> = request.views.iter().map(texel).collect();
     let patch = Arc::new(patch);
     let centres = centres(method.patches, request.slope);
     let eye =
@@ -203,7 +204,7 @@ pub fn measure(
     let plan = Plan::for_path(&patch, &first, &places, true, request.representation, Some(gpu.info()))?;
     let mut renderer = Renderer::new(gpu, patch.clone(), plan, baked)?;
     let mut results = Vec::new();
-    for view in &request.views {
+    for (view, texel) in request.views.iter().zip(texels) {
         let mut samples = Vec::new();
         for centre in &centres {
             let eye = eye(*view, *centre);
@@ -270,17 +271,22 @@ fn centres(count: u32, slope: f64) -> Vec<[f64; 2]> {
     (0..count).map(|k| [at(k % across), at(k / across)]).collect()
 }
 
-/// The viewer of a patch: the sun is in the south, positive zenith angles are on its side.
-fn eye(
-    terrain: &Terrain,
-    [zenith, azimuth]: [f64; 2],
-    centre: [f64; 2],
-    away: f64,
-    m: &Method,
-    pixels_at_1m: f64,
-) -> Eye {
+/// The direction of a viewer, away from the ground: the sun is in the south, positive zenith angles are on its side.
+fn direction([zenith, azimuth]: [f64; 2]) -> [f64; 3] {
     let (t, a) = (zenith.to_radians(), azimuth.to_radians());
-    let v = [t.sin() * a.sin(), -t.sin() * a.cos(), t.cos()];
+    [t.sin() * a.sin(), -t.sin() * a.cos(), t.cos()]
+}
+
+/// How far from its centre the image of a patch shows the ground, m: half its side over the cosine to the ground's normal.
+fn shown(view: [f64; 2], slope: f64, side: f64) -> f64 {
+    let (v, s) = (direction(view), slope.to_radians());
+    let cosine = v[2] * s.cos() - v[1] * s.sin();
+    side * (0.5 / cosine.max(0.1) + 0.1)
+}
+
+/// The viewer of a patch.
+fn eye(terrain: &Terrain, view: [f64; 2], centre: [f64; 2], away: f64, m: &Method, pixels_at_1m: f64) -> Eye {
+    let v = direction(view);
     let ground = crate::physics::terrain::height_at(terrain, centre[0], centre[1]);
     let target = [centre[0], centre[1], ground];
     let position = std::array::from_fn(|k| target[k] + away * v[k]);
@@ -331,5 +337,28 @@ fn average(view: [f64; 2], samples: &[[f64; 10]], noise: [f64; 3]) -> Measured {
         sky: [mean[7], mean[8], mean[9]],
         stderr,
         noise,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Along a slope that falls away from the sun by 30° a viewer 50° from the zenith on the sun's side looks at 80° to its normal.
+    #[test]
+    fn a_patch_shows_more_of_a_slope_that_is_seen_along() {
+        let along = |angle: f64| 150.0 * (0.5 / angle.to_radians().cos() + 0.1);
+        for (view, slope, angle) in [
+            (0.0, 0.0, 0.0),
+            (60.0, 0.0, 60.0),
+            (50.0, -30.0, 80.0),
+            (-60.0, -30.0, 30.0),
+            (20.0, 30.0, 10.0),
+        ] {
+            let got = shown([view, 0.0], slope, 150.0);
+            assert!((got - along(angle)).abs() < 1e-9, "{view} {slope}: {got}");
+        }
+        // Never without end.
+        assert_eq!(shown([70.0, 0.0], -30.0, 150.0), 150.0 * 5.1);
     }
 }

@@ -3,8 +3,23 @@
 //! # Angles
 //! BN12 measures in a space scaled vertically so that crowns are as high as wide: S = diag(1, 1, k), with
 //! k = `vertical_scale` = crown diameter / crown height. θ_v and θ_l are the zenith angles of S v and S l, v and l being
-//! unit vectors from the ground to viewer and light, about the ground's normal S⁻¹ n (tables are of level ground); φ in [0, π] is the azimuth between them, 0 where v = l. Only the
+//! unit vectors from the ground to viewer and light; φ in [0, π] is the azimuth between them, 0 where v = l. Only the
 //! labels live in the scaled space: rays are cast in metres, along S⁻¹ of the scaled direction.
+//!
+//! # Slopes
+//! Tables are of level ground. BN12 turn it, with the trees on it, until its normal is the slope's. But trees stand upright, and
+//! as far apart on the map as on level ground: it is a shear, w ↦ (w_x, w_y, w·n/n_z), that takes a slope to level ground, and
+//! leaves which lines pass over which places at which height above the ground. It changes the shape of crowns. How a single
+//! crown looks, at x = 0, the tables know without a shear; what it does to them is therefore taken back (' is of the sheared
+//! directions, which x has no part in):
+//!
+//! - optical paths, L = x sec θ_v' V(θ_v', x) ρ_v with ρ_v = |S v| V(θ_v, 0) / (|S v'| V(θ_v', 0)), which is exact for
+//!   trees of a Poisson distribution; and so for the light;
+//! - light, T = T(x)' T(0)/T(0)' · F(L_v, L_vl)/F(L_v', L_vl'), F(a, j) = (1 − exp(−j))/j · a/(1 − exp(−a)), the part of a
+//!   layer that is lit among what is seen of it, with L_vl the path of view and light together;
+//! - sky, E = E(x)' E(0)/E(0)'.
+//!
+//! Against the reference, an oak forest on a slope of 30° away from a sun at 45°: rms 3 %, where the turn leaves 9 %.
 //!
 //! # Density
 //! x = λA: trees per m², times their mean horizontal area A = π `crown_radius`² E(scale²).
@@ -19,12 +34,14 @@
 //! - x_j = x_max (j/(m−1))².
 //!
 //! # Values
-//! - pair, index ((x·n + v)·n + l)·n + φ: (W, T_leaf, T_bark). The probability that a ground point is visible and lit is
+//! - pair, index ((x·n + v)·n + l)·n + φ: (W, T_leaf, T_bark, M). The probability that a ground point is visible and lit is
 //!   k_g = exp(−x (sec θ_v + sec θ_l) W); at x = 0, W is the limit. For opaque Poisson spheres W is 1/2 on the ridge and
 //!   nears 1 far from it. T = T_leaf + T_bark is the mean over what is visible of trees of the sun that arrives there
-//!   (BN12 eq. 16), split by the share of bark under the crown.
+//!   (BN12 eq. 16), split by the share of bark under the crown. M is the mean over the same, weighted by the sun that arrives,
+//!   of light transfer ([`super::transfer`]).
 //! - view, index x·n + v: (V, E_leaf, E_bark, Γ_v). Visible ground is P = k_g + k_ḡ = exp(−x sec θ_v V). E = E_leaf + E_bark
-//!   is the mean of δ/(1 + d²Λ/r²) over what is visible of trees (BN12 eq. 21); Γ_v is the mean coverage by crown discs at
+//!   is the mean over what is visible of trees of the sky's light on it (BN12 eq. 21), over what leaves of no orientation get under
+//!   a free sky; Γ_v is the mean coverage by crown discs at
 //!   visible ground points.
 //! - ground, index x: (D, C), the ground's mean sky visibility (BN12 eq. 18, level) and its mean coverage by discs.
 //!
@@ -114,7 +131,7 @@ pub fn secant(theta: f64) -> f64 {
     1.0 / theta.cos().max(1e-3)
 }
 
-/// Angles of viewer and light about the ground's normal in scaled space, and what else depends on them (BN12, eq. 2–5).
+/// Angles of viewer and light in scaled space (BN12, eq. 2–4), over ground that a shear has made level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Angles {
     /// θ_v, rad.
@@ -127,33 +144,35 @@ pub struct Angles {
     pub sec_v: f64,
     /// sec θ_l, at most 1000.
     pub sec_l: f64,
-    /// u(S⁻¹ n)·u_z, the factor of the density: trees per m² of the slope's plane in scaled space over those of level ground.
-    pub up: f64,
-    /// 1 where the sun is above the slope's horizon, smoothly 0 within two degrees of it.
-    pub sun_facing: f64,
+    /// Lengths of what has become of the unit vectors to viewer and light.
+    pub lengths: [f64; 2],
 }
 
-/// Angles of unit vectors to viewer and light about the ground's unit normal n, in the space scaled by S = diag(1, 1, k), k =
-/// `vertical_scale`: directions become S v, normals S⁻¹ n. Where v = l, and where either is normal to the ground, φ is 0:
-/// nothing depends on it there.
+/// Angles of unit vectors to viewer and light over ground of unit normal n, in the space scaled by S = diag(1, 1, k), k =
+/// `vertical_scale`. Where v = l, and where either is vertical, φ is 0: nothing depends on it there.
 pub fn angles(v: [f64; 3], l: [f64; 3], n: [f64; 3], vertical_scale: f64) -> Angles {
-    let scaled = |w: [f64; 3]| DVec3::new(w[0], w[1], vertical_scale * w[2]).normalize();
-    let normal = DVec3::new(vertical_scale * n[0], vertical_scale * n[1], n[2]).normalize();
-    let (v, l) = (scaled(v), scaled(l));
-    let (cos_v, cos_l) = (v.dot(normal), l.dot(normal));
-    let zenith = |w: DVec3, cosine: f64| w.cross(normal).length().atan2(cosine);
-    // Of the parts along the ground; atan2(0, 0) = 0 where either has none.
-    let (pv, pl) = (v - cos_v * normal, l - cos_l * normal);
-    let t = (cos_l / 0.0349).clamp(0.0, 1.0);
+    let normal = DVec3::from(n);
+    let level = vertical_scale / normal.z.max(1e-3);
+    let sheared = |w: [f64; 3]| DVec3::new(w[0], w[1], level * DVec3::from(w).dot(normal));
+    let (v, l) = (sheared(v), sheared(l));
+    let zenith = |w: DVec3| w.truncate().length().atan2(w.z);
+    // atan2(0, 0) = 0 where either is vertical.
+    let (across, along) = (v.truncate().perp_dot(l.truncate()), v.truncate().dot(l.truncate()));
     Angles {
-        v: zenith(v, cos_v),
-        l: zenith(l, cos_l),
-        phi: pv.cross(pl).length().atan2(pv.dot(pl)),
-        sec_v: 1.0 / cos_v.max(1e-3),
-        sec_l: 1.0 / cos_l.max(1e-3),
-        up: normal.z,
-        sun_facing: t * t * (3.0 - 2.0 * t),
+        v: zenith(v),
+        l: zenith(l),
+        // Never −0, of which atan2 makes π.
+        phi: across.abs().atan2(along + 0.0),
+        sec_v: 1.0 / (v.z / v.length()).max(1e-3),
+        sec_l: 1.0 / (l.z / l.length()).max(1e-3),
+        lengths: [v, l].map(DVec3::length),
     }
+}
+
+/// 1 where the sun, towards l, is above the horizon of a slope of normal n, smoothly 0 within two degrees of it.
+pub fn sun_facing(l: [f64; 3], n: [f64; 3]) -> f64 {
+    let t = (DVec3::from(l).dot(DVec3::from(n)) / 0.0349).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
 }
 
 /// The two nodes around a coordinate, and the weight of the second.
@@ -162,8 +181,8 @@ fn cell(coordinate: f64, count: usize) -> (usize, f64) {
     (first, coordinate - first as f64)
 }
 
-/// (W, T_leaf, T_bark) between the nodes: linear in the four coordinates.
-pub fn pair(t: &ForestTables, theta_v: f64, theta_l: f64, phi: f64, x: f64) -> [f64; 3] {
+/// (W, T_leaf, T_bark, M) between the nodes: linear in the four coordinates.
+pub fn pair(t: &ForestTables, theta_v: f64, theta_l: f64, phi: f64, x: f64) -> [f64; 4] {
     let (n, m) = (t.angles as usize, t.densities as usize);
     let axes = [
         cell(density_coordinate(m, f64::from(t.max_thickness), x), m),
@@ -171,7 +190,7 @@ pub fn pair(t: &ForestTables, theta_v: f64, theta_l: f64, phi: f64, x: f64) -> [
         cell(light_coordinate(n, theta_v, theta_l), n),
         cell(azimuth_coordinate(n, phi), n),
     ];
-    let mut sum = [0.0; 3];
+    let mut sum = [0.0; 4];
     for corner in 0..16 {
         let (mut index, mut weight) = (0, 1.0);
         for (axis, &(first, f)) in axes.iter().enumerate() {
@@ -213,4 +232,55 @@ pub fn joint_ground(t: &ForestTables, theta_v: f64, theta_l: f64, phi: f64, x: f
     let w = pair(t, theta_v, theta_l, phi, x)[0];
     // At nodes W is bounded by V; between them, where both are interpolated, not to the last bit.
     (-x.max(0.0) * (secant(theta_v) + secant(theta_l)) * w).exp().min(visible_ground(t, theta_v, x))
+}
+
+/// What is seen of a species' forest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forest {
+    /// Optical path of the view: P = exp(−seen).
+    pub seen: f64,
+    /// Of view and light together, at least that: k_g = exp(−joint).
+    pub joint: f64,
+    /// Γ_v.
+    pub coverage: f64,
+    /// T of leaves and of bark, but for [`sun_facing`].
+    pub sun: [f64; 2],
+    /// M.
+    pub transfer: f64,
+    /// E of leaves and of bark.
+    pub sky: [f64; 2],
+}
+
+/// Mean of exp(−x t) over t in [0, 1].
+fn mean_through(x: f64) -> f64 {
+    if x < 1e-6 { 1.0 - 0.5 * x } else { -(-x).exp_m1() / x }
+}
+
+/// What is seen along v of trees of optical thickness x, lit from l, on a slope of unit normal n: see the module's head.
+pub fn forest(t: &ForestTables, v: [f64; 3], l: [f64; 3], n: [f64; 3], x: f64) -> Forest {
+    let [s, u] = [n, [0.0, 0.0, 1.0]].map(|n| angles(v, l, n, f64::from(t.vertical_scale)));
+    // Paths of single crowns, over those of sheared ones.
+    let [v0, l0] = [[s.v, u.v], [s.l, u.l]].map(|a| a.map(|a| view(t, a, 0.0)));
+    let ratio = |[s0, u0]: [[f64; 4]; 2], k: usize| u.lengths[k] * u0[0] / (s.lengths[k] * s0[0]);
+    let (view_path, light_path) = (ratio(v0, 0), ratio(l0, 1));
+    let [path, leaf, bark, coverage] = view(t, s.v, x);
+    let [w, lit_leaf, lit_bark, transfer] = pair(t, s.v, s.l, s.phi, x);
+    let [s0, u0] = [s, u].map(|a| pair(t, a.v, a.l, a.phi, 0.0));
+    let sheared = x * s.sec_v * path;
+    let sheared_joint = (x * (s.sec_v + s.sec_l) * w).max(sheared);
+    let seen = sheared * view_path;
+    let joint = (x * (s.sec_v * view_path + s.sec_l * light_path) * w).max(seen);
+    let layer =
+        mean_through(joint) * mean_through(sheared) / (mean_through(sheared_joint) * mean_through(seen));
+    let change = layer * (u0[1] + u0[2]) / (s0[1] + s0[2]).max(1e-3);
+    let lit = change.min(1.0 / (lit_leaf + lit_bark).max(1e-6));
+    let sky = (v0[1][1] + v0[1][2]) / (v0[0][1] + v0[0][2]).max(1e-3);
+    Forest {
+        seen,
+        joint,
+        coverage,
+        sun: [lit * lit_leaf, lit * lit_bark],
+        transfer: transfer * u0[3] / s0[3].max(1e-3),
+        sky: [sky * leaf, sky * bark],
+    }
 }

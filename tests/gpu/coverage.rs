@@ -335,6 +335,7 @@ fn nothing_jumps_when_quads_split() {
     // No tree is drawn, no sun shines: what is seen is the ground as coverage darkens it, at a metre a pixel.
     let mut scene = plain(450.0, [0.02, 0.01]);
     scene.settings.set("zfield_min_pixels", 64.0).unwrap();
+    scene.settings.set("ground_contrast", 1.0).unwrap();
     let frame = |height: f64| {
         let camera = Camera { vertical_fov: 30.0, ..from_height(&scene, height) };
         let mut renderer = device::renderer(&gpu, &scene, &camera, [480, 480], true);

@@ -83,14 +83,13 @@ fn oracle(
 ) -> [[f64; 4]; 3] {
     let l = sun_direction(&scene.sun);
     let level = density * f64::from(row.mean_area);
-    let a = tables::angles(v, l, n, f64::from(t.vertical_scale));
-    let x = level * a.up;
-    let (open, joint) = (tables::visible_ground(t, a.v, x), tables::joint_ground(t, a.v, a.l, a.phi, x));
-    let ([_, leaf, bark], [_, sky_leaf, sky_bark, seen_coverage]) =
-        (tables::pair(t, a.v, a.l, a.phi, x), tables::view(t, a.v, x));
+    let f = tables::forest(t, v, l, n, level);
+    let (open, joint) = ((-f.seen).exp(), (-f.joint).exp());
+    let ([leaf, bark], [sky_leaf, sky_bark], seen_coverage) = (f.sun, f.sky, f.coverage);
     let [sky, coverage] = tables::ground(t, level);
     let trees = 1.0 - open;
-    let lit = a.sun_facing * (leaf + bark);
+    let facing = tables::sun_facing(l, n);
+    let lit = facing * (leaf + bark);
     let cosine = (0..3).map(|k| n[k] * l[k]).sum::<f64>().max(0.0);
     let joint = if cosine > 0.0 { joint } else { 0.0 };
     let angle = light::angle_between(v, l);
@@ -107,7 +106,7 @@ fn oracle(
         let turned = light::turned_reflectance(row.turning.into(), angle);
         let full = light::leaf_phase(angle, r * turned, t) * hotspot * E[c];
         from_sun[c] =
-            trees * a.sun_facing * full * (leaf + b * bark) + joint * ALBEDO[c] * cosine / PI * E[c];
+            trees * facing * f.transfer * full * (leaf + b * bark) + joint * ALBEDO[c] * cosine / PI * E[c];
         let leaves = 0.25 * (1.0 + n[2]) * f64::from(row.albedo[c]) * (sky_leaf + b * sky_bark);
         from_sky[c] = SKY[c] * (trees * leaves + open * ALBEDO[c] * 0.5 * (1.0 + n[2]) * sky * contrast);
     }

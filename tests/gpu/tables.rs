@@ -61,26 +61,35 @@ fn angles_about_any_ground_are_those_of_the_oracle() {
     for (c, out) in cases.iter().zip(evaluate(&gpu, Function::TableAngles, &arguments)) {
         let [v, l, n] = c.0.map(|w| w.map(f64::from));
         let want = tables::angles(v, l, n, f64::from(c.1));
-        let got: [f64; 7] = std::array::from_fn(|k| float(&out, k));
+        let got: [f64; 8] = std::array::from_fn(|k| float(&out, k));
         assert!(got.iter().all(|x| x.is_finite()), "{c:?}: {got:?}");
         let at = || format!("{c:?}: {got:?} {want:?}");
-        // Scaled vectors to 4 ulp (a product, a sum of squares, an inverse square root), their products to ten roundings
-        // more; then atan.
-        for (got, want) in [(got[0], want.v), (got[1], want.l)] {
-            zenith.note((got - want).abs() / (30.0 * EPS + ATAN * want), at);
+        // The height of a sheared vector is a product of up to four roundings, and three more of its sum's largest term, k w.n
+        // over n.z; it turns the vector by its part across. Then atan.
+        let level = f64::from(c.1) / n[2].max(1e-3);
+        let off = |w: [f64; 3], length: f64| {
+            let largest = (0..3).map(|i| (w[i] * n[i]).abs()).fold(0.0, f64::max);
+            10.0 * EPS * level * largest / length.max(1e-12)
+        };
+        let off = [off(v, want.lengths[0]), off(l, want.lengths[1])];
+        for (got, want, off) in [(got[0], want.v, off[0]), (got[1], want.l, off[1])] {
+            zenith.note((got - want).abs() / (off + 30.0 * EPS + ATAN * want), at);
         }
         // 1 / cos, at most 1000.
-        for (got, want) in [(got[3], want.sec_v), (got[4], want.sec_l)] {
-            secant.note((got - want).abs() / (EPS * (30.0 * want * want + 6.0 * want)), at);
+        for (got, want, off) in [(got[3], want.sec_v, off[0]), (got[4], want.sec_l, off[1])] {
+            secant.note((got - want).abs() / ((off + 30.0 * EPS) * want * want + 6.0 * EPS * want), at);
         }
-        // Of parts along the ground as long as the sines of the zenith angles; what keeps atan defined is 1e-9.
-        let (sin_v, sin_l) = (want.v.sin().max(1e-12), want.l.sin().max(1e-12));
+        for ((got, want), off) in [got[5], got[6]].into_iter().zip(want.lengths).zip(off) {
+            other.note((got - want).abs() / (want * (off + 10.0 * EPS)), at);
+        }
+        // Of the parts along the ground; what keeps atan defined is 1e-9.
+        let along = |w: [f64; 3]| w[0].hypot(w[1]).max(1e-12);
+        let (sin_v, sin_l) = (along(v), along(l));
         let room = 40.0 * EPS * (1.0 / sin_v + 1.0 / sin_l) + 2e-9 / (sin_v * sin_l) + ATAN * want.phi;
         azimuth.note((got[2] - want.phi).abs() / room.min(PI), at);
         assert!((0.0..=PI + 1e-6).contains(&got[2]), "{}", at());
-        // A component to 8 roundings; the smoothstep's slope is 1.5 / 0.0349.
-        other.note((got[5] - want.up).abs() / (10.0 * EPS), at);
-        other.note((got[6] - want.sun_facing).abs() / (43.0 * 30.0 * EPS), at);
+        // The smoothstep's slope is 1.5 / 0.0349.
+        other.note((got[7] - tables::sun_facing(l, n)).abs() / (43.0 * 30.0 * EPS), at);
         if c.0[0] == c.0[1] {
             same += 1;
             assert_eq!((want.v, want.phi), (want.l, 0.0), "{c:?}");
@@ -92,7 +101,7 @@ fn angles_about_any_ground_are_those_of_the_oracle() {
     zenith.within(1.0, "zenith angles");
     azimuth.within(1.0, "azimuth");
     secant.within(1.0, "secants");
-    other.within(1.0, "density and sun");
+    other.within(1.0, "lengths and sun");
     gpu.close().unwrap();
 }
 
@@ -160,7 +169,9 @@ fn random(seed: u32, (n, m): (u32, u32), max_thickness: f32) -> ForestTables {
         max_thickness,
         area: 10.0,
         vertical_scale: 1.0,
-        pair: (0..pairs).map(|_| [0; 3].map(|_| value())).collect(),
+        hole: 1.0,
+        sky: [1.0, 0.0],
+        pair: (0..pairs).map(|_| [0; 4].map(|_| value())).collect(),
         pair_stderr: Vec::new(),
         view: (0..views).map(|_| [0; 4].map(|_| value())).collect(),
         view_stderr: Vec::new(),

@@ -1,9 +1,9 @@
 //! What storing a quantity in few bits costs, against 32: as shares of a step of radiance that the eye just sees.
 
-use canopy::bake::{ForestTables, ZField};
+use canopy::bake::{ForestTables, Transfer, ZField};
 use canopy::physics::hash::Stream;
 use canopy::physics::views::{self, Basis};
-use canopy::physics::{tables, zfield};
+use canopy::physics::{tables, transfer, zfield};
 use glam::DVec3;
 use half::f16;
 use std::f64::consts::PI;
@@ -44,6 +44,7 @@ fn few_bits_cost_less_than_is_seen() {
     println!("| quantity | 8 bits | 16 bits | half | used |\n|---|---|---|---|---|");
     let species = &baked[0].species;
     z_fields(&species.views, f64::from(species.radius));
+    light_transfer(&species.transfer);
     forest_tables(&baked[0].tables);
     coverage();
     targets();
@@ -88,6 +89,48 @@ fn z_fields(field: &ZField, metres: f64) {
         // Steps of 1/65535; and of 2^-11, of half floats from 1/2 to 1.
         row(name, [e, e / 257.0, e * 255.0 / 2048.0], ("8 bits", e), 1.0);
     }
+}
+
+/// Coefficients of light transfer: M of single texels, over its mean of 1. What is stored lies anywhere within its byte's step.
+fn light_transfer(t: &Transfer) {
+    let texels: Vec<&[[u8; 4]]> = t.bands.iter().map(|b| b[0].as_chunks::<4>().0).collect();
+    let mut stream = Stream::new(7);
+    let mut errors: [Vec<f64>; 3] = Default::default();
+    while errors[0].len() < 20_000 {
+        let k = (stream.unit() * texels[0].len() as f64) as usize;
+        if texels.iter().all(|b| b[k] == transfer::NEUTRAL) {
+            continue;
+        }
+        let l = transfer_light(&mut stream);
+        let exact: Vec<[f64; 4]> = texels
+            .iter()
+            .map(|b| transfer::decode(b[k]).map(|x| x + transfer::STEP * (stream.unit() - 0.5)))
+            .collect();
+        let m = |f: &dyn Fn([f64; 4]) -> [f64; 4]| {
+            let bands: Vec<[f64; 4]> = exact.iter().map(|x| f(*x)).collect();
+            // At a phase angle of 1 rad.
+            transfer::transfer(&bands, l, transfer::reach(1.0))
+        };
+        let truth = m(&|x| x);
+        let finer = transfer::STEP / 256.0;
+        let formats: [&dyn Fn([f64; 4]) -> [f64; 4]; 3] =
+            [&|x| transfer::decode(transfer::encode(x)), &|x| x.map(|x| (x / finer).round() * finer), &|x| {
+                x.map(half)
+            }];
+        for (errors, f) in errors.iter_mut().zip(formats) {
+            errors.push(m(f) - truth);
+        }
+    }
+    let e = errors.map(|e| rms(&e));
+    // Of one texel; three views of four texels each are blended.
+    row("light transfer of a texel", e, ("8 bits", e[0]), 1.5);
+}
+
+/// A light above the horizon.
+fn transfer_light(stream: &mut Stream) -> [f64; 3] {
+    let (z, a) = (stream.unit(), std::f64::consts::TAU * stream.unit());
+    let r = (1.0 - z * z).sqrt();
+    [r * a.cos(), r * a.sin(), z]
 }
 
 /// Tables: lit leaves and what is seen of the ground through them, as they are looked up.

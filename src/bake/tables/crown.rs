@@ -5,6 +5,7 @@
 //! the point a·right + b·up where it meets the plane through the centre across w; depths count from there along w.
 
 use crate::bake::SpeciesBake;
+use crate::physics::transfer::TERMS;
 
 /// Proportions and optics of a tree of scale 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +26,8 @@ pub struct Shape {
     pub leaf_shadow: f32,
     /// See there.
     pub extinction: f32,
+    /// Of its leaves.
+    pub leaf: LeafOptics,
 }
 
 impl Shape {
@@ -39,6 +42,7 @@ impl Shape {
             height: bake.height,
             leaf_shadow: bake.leaf_shadow,
             extinction: bake.extinction,
+            leaf: LeafOptics::of(bake),
         }
     }
 
@@ -54,6 +58,32 @@ impl Shape {
         let t = ((z - (base - 0.05)) / 0.1).clamp(0.0, 1.0);
         1.0 - t * t * (3.0 - 2.0 * t)
     }
+}
+
+/// What leaves do with light, luminances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeafOptics {
+    /// Reflectance and transmittance of the leaves that scatter the sun as the crown does ([`SpeciesBake::crown`]).
+    pub scattered: [f32; 2],
+    /// Change of the reflectance with the phase angle, 1/rad.
+    pub turning: f32,
+    /// Share of the sky's light that is scattered ([`SpeciesBake::sky_albedo`]).
+    pub albedo: f32,
+}
+
+impl LeafOptics {
+    fn of(bake: &SpeciesBake) -> Self {
+        LeafOptics {
+            scattered: bake.crown().map(luminance),
+            turning: bake.turned.slope_of(),
+            albedo: luminance(bake.sky_albedo()),
+        }
+    }
+}
+
+/// Of linear RGB (Rec. 709).
+fn luminance([r, g, b]: [f32; 3]) -> f32 {
+    0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
 /// What a viewer sees of a crown on a ray.
@@ -76,6 +106,20 @@ pub struct Cast {
     pub back: f32,
 }
 
+/// Coefficients of light transfer ([`crate::physics::transfer`]) of a point that is seen; by default they change nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TransferAt(pub [f32; 2 * TERMS]);
+
+impl TransferAt {
+    /// M for light from a unit vector in the tree's own axes, with w = `reach`.
+    #[inline]
+    pub fn of(&self, [x, y, z]: [f32; 3], reach: f32) -> f32 {
+        let terms = [1.0, x, y, z, x * y, y * z, x * z, x * x - y * y];
+        let sum: f32 = self.0.iter().zip(terms).map(|(c, y)| c * y).sum();
+        (1.0 + reach * sum).max(0.0)
+    }
+}
+
 /// A crown that rays can be cast at.
 pub trait Crown: Sync {
     /// All that is the same for parallel rays.
@@ -95,4 +139,9 @@ pub trait Crown: Sync {
 
     /// Depth along w at which the ray of light (a, b) enters the crown; `None` where self-shadows are left out.
     fn entry(&self, aim: &Self::Aim, a: f32, b: f32) -> Option<f32>;
+
+    /// Light transfer of what the view ray (a, b) has met at a depth along w.
+    fn transfer(&self, _aim: &Self::Aim, _at: [f32; 3]) -> TransferAt {
+        TransferAt::default()
+    }
 }

@@ -3,8 +3,9 @@
 
 use std::f32::consts::SQRT_2;
 
-use super::crown::{Cast, Crown, Seen, Shape};
+use super::crown::{Cast, Crown, Seen, Shape, TransferAt};
 use crate::bake::SpeciesBake;
+use crate::physics::transfer::{self, TERMS};
 use crate::physics::views::{self, Basis};
 use crate::physics::zfield::AGREEMENT;
 
@@ -114,6 +115,35 @@ pub struct FieldAim {
     start: [f32; 2],
 }
 
+/// Light transfer of all views, on one level.
+struct TransferLevel {
+    size: usize,
+    /// By band, as in [`crate::bake::Transfer`].
+    bands: Vec<Vec<u8>>,
+}
+
+impl TransferLevel {
+    /// The level with at most `size` texels a side.
+    fn new(bake: &SpeciesBake, size: u32) -> Self {
+        let level = (bake.transfer.resolution / size).max(1).ilog2();
+        TransferLevel {
+            size: (bake.transfer.resolution >> level) as usize,
+            bands: bake.transfer.bands.iter().map(|b| b[level as usize].clone()).collect(),
+        }
+    }
+
+    /// Coefficients of the texel at a position.
+    fn nearest(&self, layer: u32, x: f32, y: f32) -> [f32; 2 * TERMS] {
+        let at = |v: f32| (v * self.size as f32).clamp(0.0, self.size as f32 - 1.0) as usize;
+        let texel = (layer as usize * self.size + at(y)) * self.size + at(x);
+        let mut all = [0.0; 2 * TERMS];
+        for (to, band) in all.as_chunks_mut::<TERMS>().0.iter_mut().zip(&self.bands) {
+            *to = transfer::decode(band.as_chunks::<TERMS>().0[texel]).map(|x| x as f32);
+        }
+        all
+    }
+}
+
 /// A z-field to cast rays at.
 pub struct FieldCrown {
     shape: Shape,
@@ -121,6 +151,7 @@ pub struct FieldCrown {
     border: f64,
     fine: Level,
     coarse: Level,
+    transfer: TransferLevel,
     magnified: bool,
     view_iterations: u32,
     light_iterations: u32,
@@ -145,6 +176,7 @@ impl FieldCrown {
             border: r / (r - 2.0),
             fine: Level::new(bake, level),
             coarse: Level::new(bake, level + 1),
+            transfer: TransferLevel::new(bake, resolution / 2),
             magnified: level == 0,
             view_iterations,
             light_iterations,
@@ -256,5 +288,18 @@ impl Crown for FieldCrown {
             s = self.look(&self.fine, aim, (a, b, s), true, iteration > 0).s;
         }
         (self.light_iterations > 0).then_some(s)
+    }
+
+    fn transfer(&self, aim: &FieldAim, [a, b, s]: [f32; 3]) -> TransferAt {
+        let (mut sum, mut alpha) = ([0.0; 2 * TERMS], 0.0);
+        for view in aim.views.iter().filter(|_| !self.transfer.bands.is_empty()) {
+            let x = 0.5 + a * view.u[0] + b * view.u[1] + s * view.u[2];
+            let y = 0.5 + a * view.v[0] + b * view.v[1] + s * view.v[2];
+            let share = view.weight * self.fine.near(view.layer, x, y)[2];
+            alpha += share;
+            let found = self.transfer.nearest(view.layer, x, y);
+            sum.iter_mut().zip(found).for_each(|(s, x)| *s += share * x);
+        }
+        TransferAt(sum.map(|s| if alpha > 0.0 { s / alpha } else { 0.0 }))
     }
 }

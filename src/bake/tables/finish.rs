@@ -2,7 +2,7 @@
 
 use super::crown::Shape;
 use super::measure::{Estimate, Measured, PairEstimate};
-use super::{ForestSettings, ForestTables, mean_area};
+use super::{ForestSettings, ForestTables, mean_area, sky};
 use crate::physics::tables::{density_node, light_node, secant, zenith_node};
 
 /// A transmittance counts as measured when it is this many times its standard error.
@@ -41,8 +41,10 @@ pub fn tables(shape: &Shape, forest: &ForestSettings, measured: &Measured) -> Fo
         max_thickness: max_thickness as f32,
         area: area as f32,
         vertical_scale: shape.vertical_scale() as f32,
-        pair: vec![[0.0; 3]; m * n * n * n],
-        pair_stderr: vec![[0.0; 3]; m * n * n * n],
+        hole: 0.0,
+        sky: [1.0, 0.0],
+        pair: vec![[0.0; 4]; m * n * n * n],
+        pair_stderr: vec![[0.0; 4]; m * n * n * n],
         view: vec![[0.0; 4]; m * n],
         view_stderr: vec![[0.0; 4]; m * n],
         ground: measured.ground.iter().map(|g| g.map(|e| e.0.clamp(0.0, 1.0) as f32)).collect(),
@@ -54,11 +56,10 @@ pub fn tables(shape: &Shape, forest: &ForestSettings, measured: &Measured) -> Fo
         let path: Vec<Estimate> = views.iter().enumerate().map(|(x, e)| limit(x, e.ground)).collect();
         let path = thickness(&path, &nodes, &least, &even);
         for (x, e) in views.iter().enumerate() {
-            let share = |e: Estimate| e.0.clamp(0.0, 1.0) as f32;
             let value = (path[x] / secant(theta_v)) as f32;
-            t.view[x * n + v] = [value, share(e.leaf), share(e.bark), share(e.coverage)];
+            t.view[x * n + v] = [value, 0.0, 0.0, e.coverage.0.clamp(0.0, 1.0) as f32];
             let ground = if x == 0 { 0.0 } else { e.ground.1 };
-            t.view_stderr[x * n + v] = [ground, e.leaf.1, e.bark.1, e.coverage.1].map(|e| e as f32);
+            t.view_stderr[x * n + v] = [ground, 0.0, 0.0, e.coverage.1].map(|e| e as f32);
         }
         for l in 0..n {
             let theta_l = light_node(n, l, theta_v);
@@ -79,13 +80,14 @@ pub fn tables(shape: &Shape, forest: &ForestSettings, measured: &Measured) -> Fo
                     let at = ((x * n + v) * n + l) * n + k;
                     let leaf = e.leaf.0.clamp(0.0, 1.0);
                     let w = joint[x] / (secant(theta_v) + secant(theta_l));
-                    t.pair[at] = [w, leaf, e.bark.0.clamp(0.0, 1.0 - leaf)].map(|v| v as f32);
+                    t.pair[at] = [w, leaf, e.bark.0.clamp(0.0, 1.0 - leaf), e.transfer.0].map(|v| v as f32);
                     let ground = if x == 0 { 0.0 } else { e.ground.1 };
-                    t.pair_stderr[at] = [ground, e.leaf.1, e.bark.1].map(|e| e as f32);
+                    t.pair_stderr[at] = [ground, e.leaf.1, e.bark.1, e.transfer.1].map(|e| e as f32);
                 }
             }
         }
     }
+    sky::fill(&mut t, &measured.sky, &shape.leaf, forest);
     t
 }
 
@@ -101,6 +103,7 @@ fn isotropic(row: &mut [PairEstimate]) {
         lit: row[0].lit,
         leaf: mean(|e| e.leaf),
         bark: mean(|e| e.bark),
+        transfer: mean(|e| e.transfer),
     };
     row.fill(same);
 }

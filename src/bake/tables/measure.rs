@@ -9,12 +9,14 @@ use std::f64::consts::TAU;
 use rayon::prelude::*;
 
 use super::ForestSettings;
-use super::crown::Crown;
+use super::crown::{Crown, TransferAt};
 use super::patch::{Patch, Segment, TURNS, patches};
+use super::sky::SkySeen;
 use super::statistics::{Moments, Sequence, mean, product, ratio};
 use super::trace::{Azimuth, Heading, Hit, Light, Marks, Receiver, light, own, view};
 use crate::physics::hash::{Stream, hash2};
 use crate::physics::tables::{azimuth_node, density_node, light_node, zenith_node};
+use crate::physics::transfer;
 use crate::progress::Progress;
 
 /// Independent patches.
@@ -41,6 +43,8 @@ pub struct PairEstimate {
     pub leaf: Estimate,
     /// T_bark.
     pub bark: Estimate,
+    /// M; 1 where nothing is lit.
+    pub transfer: Estimate,
 }
 
 /// Estimates at one density and view direction.
@@ -48,10 +52,6 @@ pub struct PairEstimate {
 pub struct ViewEstimate {
     /// P; at density 0 the limit of −ln P / q.
     pub ground: Estimate,
-    /// E_leaf.
-    pub leaf: Estimate,
-    /// E_bark.
-    pub bark: Estimate,
     /// Γ_v.
     pub coverage: Estimate,
 }
@@ -64,6 +64,8 @@ pub struct Measured {
     pub view: Vec<ViewEstimate>,
     /// (D, C) by x.
     pub ground: Vec<[Estimate; 2]>,
+    /// By v.
+    pub sky: Vec<SkySeen>,
 }
 
 /// What the rays of one measurement share.
@@ -111,12 +113,14 @@ struct TreeSums<const M: usize> {
     isolated: Split<M>,
     sampled: Split<M>,
     lit: Split<M>,
+    /// `lit` of leaves and bark together, with light transfer.
+    transferred: Lanes<M>,
 }
 
 impl<const M: usize> Default for TreeSums<M> {
     fn default() -> Self {
         let none = Split([[0.0; M]; 2]);
-        TreeSums { isolated: none, sampled: none, lit: none }
+        TreeSums { isolated: none, sampled: none, lit: none, transferred: [0.0; M] }
     }
 }
 
@@ -139,6 +143,7 @@ struct CrownPoint<const M: usize> {
     /// Visibility over the probability of choosing it.
     weight: Lanes<M>,
     bark: f32,
+    transfer: TransferAt,
     /// Crowns in front, of one in [`OWN`] points: the others are looked at for light through their own crown only.
     front: Option<Vec<(u32, f32)>>,
 }
@@ -207,11 +212,11 @@ pub fn measure<C: Crown, const M: usize>(
         crowns: forest.rays.div_ceil(PATCHES as u32),
     };
     let ground = scene.ground();
-    let by_view: Vec<(Vec<ViewEstimate>, Vec<PairEstimate>)> = (0..n)
+    let by_view: Vec<(Vec<ViewEstimate>, SkySeen, Vec<PairEstimate>)> = (0..n)
         .into_par_iter()
         .map(|v| {
             let theta_v = zenith_node(n, v);
-            let (points, estimates) = scene.view_points(theta_v);
+            let (points, estimates, sky) = scene.view_points(theta_v);
             let pairs: Vec<PairEstimate> = (0..n)
                 .into_par_iter()
                 .flat_map_iter(|l| {
@@ -220,11 +225,16 @@ pub fn measure<C: Crown, const M: usize>(
                     pairs
                 })
                 .collect();
-            (estimates, pairs)
+            (estimates, sky, pairs)
         })
         .collect();
-    let (view, pair): (Vec<_>, Vec<_>) = by_view.into_iter().unzip();
-    Measured { pair: pair.concat(), view: view.concat(), ground }
+    let mut measured = Measured { pair: Vec::new(), view: Vec::new(), sky: Vec::new(), ground };
+    for (view, sky, pair) in by_view {
+        measured.view.extend(view);
+        measured.sky.push(sky);
+        measured.pair.extend(pair);
+    }
+    measured
 }
 
 impl<C: Crown, const M: usize> Scene<'_, C, M> {
@@ -293,7 +303,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
     }
 
     /// View rays of a direction: the points that light is then cast to, and what needs no light.
-    fn view_points(&self, theta_v: f64) -> (ViewPoints<C::Aim, M>, Vec<ViewEstimate>) {
+    fn view_points(&self, theta_v: f64) -> (ViewPoints<C::Aim, M>, Vec<ViewEstimate>, SkySeen) {
         let heading = Heading::new(self.crown, theta_v, self.vertical_scale);
         let by_patch: Vec<_> = (0..PATCHES)
             .into_par_iter()
@@ -307,8 +317,6 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
         let estimates = (0..self.densities())
             .map(|x| ViewEstimate {
                 ground: mean(by_patch.iter().map(|p| f64::from(p.0[x]) * share)),
-                leaf: ratio(by_patch.iter().map(|p| (p.4[0][x], p.4[2][x]))),
-                bark: ratio(by_patch.iter().map(|p| (p.4[1][x], p.4[2][x]))),
                 coverage: if x == 0 {
                     (0.0, 0.0)
                 } else {
@@ -327,7 +335,9 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
             weight: Vec::new(),
             expected,
         };
-        for (_, _, ground, crown, _) in by_patch {
+        let mut sky_seen = SkySeen::default();
+        for (_, _, ground, crown, sky) in by_patch {
+            sky_seen.add(&sky);
             let sum = |lanes: &mut dyn Iterator<Item = &Lanes<M>>| {
                 lanes.fold([0.0; M], |mut s, x| {
                     add(&mut s, x);
@@ -339,7 +349,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
             points.ground.push(ground);
             points.crown.push(crown);
         }
-        (points, estimates)
+        (points, estimates, sky_seen)
     }
 
     /// Σ visible, and Σ of visible where no disc covers the ground, over the single points of a patch.
@@ -384,20 +394,19 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
             .collect()
     }
 
-    /// The points of T in a patch, and Σ of weighted sky visibility over leaves, over bark, and Σ of weights, for E.
+    /// The points of T in a patch, and what all crowns on the rays see of the sky.
     ///
     /// Rays go through points of crowns' boxes, so that few are wasted where trees are few: a ray is found with a density
     /// ∝ Σ 1/scale² over the boxes that it passes, and weighs the inverse. Crown k on it is seen with
     /// a_k = α_k ∏_{j in front} (1 − q α_j). Points of T are chosen among all crowns of all rays, systematically, with
     /// probabilities ∝ the mean over densities of their share of Σ a, so that all count about the same at every density.
-    fn crown_points(&self, p: usize, heading: &Heading<C::Aim>) -> (Vec<CrownPoint<M>>, [[f64; M]; 3]) {
+    fn crown_points(&self, p: usize, heading: &Heading<C::Aim>) -> (Vec<CrownPoint<M>>, SkySeen) {
         let patch = &self.patches[p];
         let shape = self.crown.shape();
-        let extent = heading.extent();
-        let random = sequence::<4>(CROWNS, p);
-        let mut sky = [[0.0; M]; 3];
+        let (mut sky, full) = (SkySeen::default(), self.densities() - 1);
         let (mut hits, mut seen): (Vec<Hit>, Vec<SeenCrown<M>>) = (Vec::new(), Vec::new());
         let mut total = [0.0; M];
+        let (extent, random) = (heading.extent(), sequence::<4>(CROWNS, p));
         for i in 0..if patch.trees.is_empty() { 0 } else { OWN * self.crowns } {
             let [u, v, turned, t] = random.at(i);
             let tree = &patch.trees[((t * patch.trees.len() as f64) as usize).min(patch.trees.len() - 1)];
@@ -415,16 +424,9 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                 through.iter_mut().zip(&self.q).for_each(|(t, q)| *t *= 1.0 - q * h.alpha);
                 add(&mut total, &weight);
                 seen.push(SeenCrown { hit: *h, weight, ray: i, first, position, angle });
-                let bark = shape.bark(h.height);
                 let scale = patch.trees[h.tree as usize].scale;
                 let below_top = (1.0 - h.height).max(0.0) * shape.half_height * scale;
-                for x in 0..M {
-                    let hole = self.density[x] * (below_top / self.forest.hole_radius).powi(2);
-                    let lit = f64::from(weight[x] * h.occlusion / (1.0 + hole));
-                    sky[0][x] += lit * f64::from(1.0 - bark);
-                    sky[1][x] += lit * f64::from(bark);
-                    sky[2][x] += f64::from(weight[x]);
-                }
+                sky.note([weight[0], weight[full]], h.occlusion, self.density[full] * below_top * below_top);
             }
         }
         let lanes = self.densities();
@@ -447,6 +449,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                     side: side(CROWNS, p, s.ray),
                     weight: s.weight.map(|w| (f64::from(w) / share) as f32),
                     bark: shape.bark(s.hit.height),
+                    transfer: heading.transfer(self.crown, &s.hit),
                     front: (points.len() % OWN as usize == OWN as usize / 2)
                         .then(|| seen[s.first..index].iter().map(|f| (f.hit.tree, f.hit.alpha)).collect()),
                 });
@@ -461,6 +464,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
         let heading = Heading::new(self.crown, theta_l, self.vertical_scale);
         let angles: Vec<f32> =
             (0..n).map(|k| points.heading.angle_to(&heading, azimuth_node(n, k)) as f32).collect();
+        let reach: Vec<f32> = angles.iter().map(|a| transfer::reach(f64::from(*a)) as f32).collect();
         let mut marks = Marks::new(self.patches.iter().map(|p| p.trees.len()).max().unwrap_or(0));
         // By patch: the mean share of lit ground; by azimuth and patch, sums of y, t_l, and lit leaves and bark.
         let lit: Vec<[f64; M]> = (0..PATCHES).map(|p| self.lit(p, &heading, &mut marks)).collect();
@@ -512,7 +516,11 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                     let light: Light<M> =
                         light(self.crown, patch, &heading, &azimuth, receiver, &self.q, self.largest);
                     trees.sampled.add(&c.weight, own, c.bark);
-                    trees.lit.add(&std::array::from_fn(|x| c.weight[x] * light.joint[x]), own, c.bark);
+                    let weight = std::array::from_fn(|x| c.weight[x] * light.joint[x]);
+                    trees.lit.add(&weight, own, c.bark);
+                    let toward = c.receiver.tree.map_or([0.0, 0.0, 1.0], |t| heading.toward(&azimuth, &t));
+                    let transfer = c.transfer.of(toward, reach[k]);
+                    add(&mut trees.transferred, &weight.map(|w| w * own * transfer));
                 }
             }
         }
@@ -546,6 +554,13 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                     lit: mean(lit.iter().map(|l| l[x])),
                     leaf: tree(0),
                     bark: tree(1),
+                    transfer: match ratio(trees[k].iter().map(|t| {
+                        let plain = t.lit.0.map(|lanes| f64::from(lanes[x]));
+                        (f64::from(t.transferred[x]), plain[0] + plain[1])
+                    })) {
+                        (0.0, _) => (1.0, 0.0),
+                        estimate => estimate,
+                    },
                 };
             }
         }

@@ -10,11 +10,12 @@ mod field;
 mod finish;
 mod measure;
 mod patch;
+mod sky;
 mod statistics;
 mod store;
 mod trace;
 
-pub use crown::{Cast, Crown, Seen, Shape};
+pub use crown::{Cast, Crown, LeafOptics, Seen, Shape, TransferAt};
 pub use field::{FieldAim, FieldCrown};
 pub use store::{key, load_or_measure, path};
 
@@ -47,7 +48,7 @@ pub struct ForestSettings {
     pub scale_range: [f32; 2],
     /// Poisson points (for species with listed positions) instead of the Wang pattern.
     pub poisson: bool,
-    /// Radius of the hole around a tree times the square root of the density.
+    /// Radius of the hole around a tree times the square root of the density; 0: measured.
     pub hole_radius: f32,
     /// Fixed-point iterations for the light ray; 0 leaves out self-shadow.
     pub light_iterations: u32,
@@ -86,7 +87,7 @@ impl Default for ForestSettings {
             pattern_density: 0.03,
             scale_range: [1.0; 2],
             poisson: false,
-            hole_radius: 2.0,
+            hole_radius: 0.0,
             light_iterations: 1,
             view_iterations: 2,
         }
@@ -106,10 +107,15 @@ pub struct ForestTables {
     pub area: f32,
     /// k of S = diag(1, 1, k).
     pub vertical_scale: f32,
-    /// (W, T_leaf, T_bark).
-    pub pair: Vec<[f32; 3]>,
-    /// Standard errors of (k_g, T_leaf, T_bark).
-    pub pair_stderr: Vec<[f32; 3]>,
+    /// 1/r² of the hole around a tree, over the density (BN12, eq. 9).
+    pub hole: f32,
+    /// Factor of the sky's light on a crown that is seen from the side, and its change with the cosine of the view's zenith
+    /// angle ([`crate::physics::tables`]).
+    pub sky: [f32; 2],
+    /// (W, T_leaf, T_bark, M).
+    pub pair: Vec<[f32; 4]>,
+    /// Standard errors of (k_g, T_leaf, T_bark, M).
+    pub pair_stderr: Vec<[f32; 4]>,
     /// (V, E_leaf, E_bark, Γ_v).
     pub view: Vec<[f32; 4]>,
     /// Standard errors of (P, E_leaf, E_bark, Γ_v).
@@ -141,14 +147,14 @@ fn check(forest: &ForestSettings) -> Result<()> {
         && low > 0.0
         && high >= low
         && high.is_finite()
-        && forest.hole_radius > 0.0
+        && forest.hole_radius >= 0.0
         && forest.view_iterations > 0;
     if ok {
         return Ok(());
     }
     Err(Error::Usage(format!(
         "cannot measure tables with {forest:?}: 4 to 64 angles, 2 to {MOST_DENSITIES} densities, at least one ray, \
-         1e-9 to 1000 trees per m², scales above 0 in order, a hole, at least one iteration of the view ray"
+         1e-9 to 1000 trees per m², scales above 0 in order, a hole of 0 or more, at least one iteration of the view ray"
     )))
 }
 

@@ -205,6 +205,7 @@ mod tests {
         crown_base: 2.0,
         height: 10.0,
         leaf_shadow: 0.0,
+        leaf: crate::bake::tables::LeafOptics { scattered: [0.1, 0.05], turning: 0.0, albedo: 0.15 },
         extinction: 1.0,
     };
 

@@ -9,7 +9,7 @@ use crate::Result;
 use crate::bake::file::{Fields, Format, load_or_build};
 use crate::bake::{CacheState, SpeciesBake};
 
-const FORMAT: Format = Format { magic: *b"CANOPYFT", version: 2, extension: "forest" };
+const FORMAT: Format = Format { magic: *b"CANOPYFT", version: 5, extension: "forest" };
 
 /// The tables of a species in a forest, from the cache in `cache_dir` if they are there, else measured and put there. With
 /// `None` nothing is read or written.
@@ -24,13 +24,13 @@ pub fn load_or_measure(
 ) -> Result<(ForestTables, CacheState)> {
     check(forest)?;
     let (n, m) = (forest.angles as usize, forest.densities as usize);
-    let pairs = 12 * m * n * n * n;
+    let pairs = 16 * m * n * n * n;
     load_or_build(
         (cache_dir, &FORMAT, &key(bake, forest)),
-        &[12, pairs, pairs, 16 * m * n, 16 * m * n, 8 * m, 8 * m],
+        &[24, pairs, pairs, 16 * m * n, 16 * m * n, 8 * m, 8 * m],
         |parts| decode(&parts, forest),
         |t, put| {
-            put(&little([[t.max_thickness, t.area, t.vertical_scale]].as_flattened()))?;
+            put(&little(&[t.max_thickness, t.area, t.vertical_scale, t.hole, t.sky[0], t.sky[1]]))?;
             for part in [&t.pair, &t.pair_stderr] {
                 put(&little(part.as_flattened()))?;
             }
@@ -67,15 +67,28 @@ pub fn key(bake: &SpeciesBake, forest: &ForestSettings) -> [u8; 32] {
     }
     fields.put(&pattern_density.to_le_bytes());
     fields.put(&little(&[scale_range[0], scale_range[1], hole_radius]));
-    let Shape { center, radius, half_height, crown_radius, crown_base, height, leaf_shadow, extinction } =
-        Shape::of(bake);
+    let Shape {
+        center,
+        radius,
+        half_height,
+        crown_radius,
+        crown_base,
+        height,
+        leaf_shadow,
+        extinction,
+        leaf,
+    } = Shape::of(bake);
     let shape = [center, radius, half_height, crown_radius, crown_base, height, leaf_shadow, extinction];
     fields.put(&little(&shape));
+    fields.put(&little(&[leaf.scattered[0], leaf.scattered[1], leaf.turning, leaf.albedo]));
     fields.put(&bake.views.n.to_le_bytes());
     fields.put(&bake.views.resolution.to_le_bytes());
     // Only these levels are looked at.
     for level in bake.views.levels.iter().skip(FieldCrown::level(bake, RESOLUTION)).take(2) {
         fields.put(level);
+    }
+    for band in &bake.transfer.bands {
+        fields.put(&band[0]);
     }
     fields.key()
 }
@@ -94,13 +107,15 @@ fn decode(parts: &[Vec<u8>], forest: &ForestSettings) -> ForestTables {
         let floats: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
         floats.as_chunks::<N>().0.to_vec()
     }
-    let [max_thickness, area, vertical_scale] = rows(&parts[0])[0];
+    let [max_thickness, area, vertical_scale, hole, sky0, sky1] = rows(&parts[0])[0];
     ForestTables {
         angles: forest.angles,
         densities: forest.densities,
         max_thickness,
         area,
         vertical_scale,
+        hole,
+        sky: [sky0, sky1],
         pair: rows(&parts[1]),
         pair_stderr: rows(&parts[2]),
         view: rows(&parts[3]),

@@ -6,7 +6,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::crown::Crown;
+use super::crown::{Crown, TransferAt};
 use super::patch::{Patch, Segment, TURNS, Tree};
 
 /// A direction of parallel rays: their slope in metres and in the scaled space of the tree.
@@ -84,6 +84,18 @@ impl<A> Heading<A> {
         let [ca, sa] = azimuth.along;
         let [x, y] = tree.position;
         [x + along * ca - across * sa, y + along * sa + across * ca].map(|v| v.rem_euclid(patch.side))
+    }
+
+    /// Light transfer of what a view ray along this heading has hit.
+    pub fn transfer<C: Crown<Aim = A>>(&self, crown: &C, hit: &Hit) -> TransferAt {
+        crown.transfer(&self.aims[hit.step as usize], hit.at)
+    }
+
+    /// The unit vector along the rays, in a tree's own axes.
+    pub fn toward(&self, azimuth: &Azimuth, tree: &Tree) -> [f32; 3] {
+        let (s, c) = (std::f32::consts::TAU * tree.turn as f32 / TURNS as f32).sin_cos();
+        let [x, y] = azimuth.along;
+        [self.sine * (x * c + y * s), self.sine * (y * c - x * s), self.cosine]
     }
 
     /// Horizontal position and height, `metres` along a ray from the ground.
@@ -165,6 +177,10 @@ pub struct Hit {
     pub height: f32,
     /// Sky visibility δ_v.
     pub occlusion: f32,
+    /// p_v in the axes of the ray at the tree: (a, b) and depth.
+    pub at: [f32; 3],
+    /// Azimuth that the tree sees the ray from.
+    pub step: u32,
 }
 
 /// Half the corridor's width, m.
@@ -218,6 +234,8 @@ pub fn view<C: Crown>(
                 metres,
                 height: met.b * s + seen.depth * c,
                 occlusion: seen.occlusion,
+                at: [met.a, met.b, seen.depth],
+                step: met.step,
             });
         }
     });

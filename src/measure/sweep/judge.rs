@@ -25,7 +25,7 @@ pub struct PaperChoice {
 }
 
 /// The choices of BN12 that are knobs.
-pub const PAPER: [PaperChoice; 7] = [
+pub const PAPER: [PaperChoice; 8] = [
     PaperChoice { words: "181 views", section: "§5", knob: "view_rings", value: 9.0 },
     PaperChoice { words: "views of 256 × 256", section: "§5", knob: "view_resolution", value: 256.0 },
     PaperChoice { words: "two iterations", section: "§5", knob: "view_iterations", value: 2.0 },
@@ -33,6 +33,7 @@ pub const PAPER: [PaperChoice; 7] = [
     PaperChoice { words: "4 samples a pixel", section: "§8", knob: "samples", value: 4.0 },
     PaperChoice { words: "tables of 16³", section: "§6", knob: "table_angles", value: 16.0 },
     PaperChoice { words: "8 densities", section: "§6", knob: "table_densities", value: 8.0 },
+    PaperChoice { words: "a hole of radius 2/√Λ", section: "§5", knob: "hole_radius", value: 2.0 },
 ];
 
 /// A point, judged.
