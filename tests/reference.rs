@@ -12,7 +12,7 @@ use std::time::Duration;
 use canopy::frame::camera::Eye;
 use canopy::physics::hash::Stream;
 use canopy::reference::{Estimate, Light, Options, Until, World};
-use canopy::scene::{self, Distribution, Material, Mesh, Raster, Scene, TreePosition};
+use canopy::scene::{self, Distribution, Material, Mesh, Raster, Scene, Sky, TreePosition};
 use common::{ellipsoid, material, push_triangle};
 
 /// A scene of one species with this mesh, and trees where they are listed.
@@ -129,6 +129,41 @@ fn in_a_furnace_everything_looks_the_same() {
                 assert!(grey || (1e-3..0.01).contains(&mean.stderr[k]), "random, and yet sure");
             }
         }
+    }
+}
+
+/// Level ground of albedo a under a sky of radiance cos θ (1 + ½ cos(azimuth − 0.7 rad)), an image: the irradiance is that of cos θ, 2π/3, and
+/// the ground's radiance 2a/3, for one half of the sky has what the other lacks. Against the sky itself the eye sees the
+/// image, the right way round.
+#[test]
+fn a_sky_image_lights_the_ground_as_its_integral_says() {
+    let (width, height) = (64u32, 64u32);
+    let radiance = |zenith: f64, azimuth: f64| zenith.cos().max(0.0) * (1.0 + 0.5 * (azimuth - 0.7).cos());
+    let pixels = (0..width * height)
+        .flat_map(|k| {
+            let zenith = (f64::from(k / width) + 0.5) / f64::from(height) * std::f64::consts::PI;
+            let azimuth = (f64::from(k % width) + 0.5) / f64::from(width) * std::f64::consts::TAU;
+            [1.0f64, 2.0, 0.5].map(|c| (c * radiance(zenith, azimuth)) as f32)
+        })
+        .collect();
+    let mut scene = forest(shrub(), vec![tree(100.0, 100.0)], 50_000.0, EVEN_SKY);
+    scene.sky = Sky::LatLong { width, height, pixels: Arc::new(pixels) };
+    ground(&mut scene, [0.3; 3]);
+    let options = Options { until: Until::Samples(64), ..Options::default() };
+    let seen = render(&scene, &from_afar([25_000.0, 25_000.0, 0.0], 30.0, 40.0, 9.0, 24), &options).mean();
+    for (k, colour) in [1.0, 2.0, 0.5].into_iter().enumerate() {
+        let want = colour * 2.0 * 0.3 / 3.0;
+        // Texels of 2.8 degrees are a step of cos θ of 1/64 of its range at most, and hold their centres' values: 1e-3.
+        assert!((seen.sky[k] - want).abs() < 5.0 * seen.stderr[k] + 1e-3 * want, "{:?} {want}", seen.sky);
+        assert!(seen.stderr[k] < 0.01 * want, "{:?}", seen.stderr);
+    }
+    for (azimuth, elevation) in [(0.0f64, 30.0f64), (90.0, 30.0), (180.0, 60.0), (300.0, 10.0)] {
+        let ((sa, ca), (se, ce)) = (azimuth.to_radians().sin_cos(), elevation.to_radians().sin_cos());
+        let eye = Eye::looking([25_000.0, 25_000.0, 5.0], [ce * sa, ce * ca, se], 1.0, [4; 2]);
+        let seen = render(&scene, &eye, &options).mean().sky[0];
+        let want = radiance((90.0 - elevation).to_radians(), azimuth.to_radians());
+        // Linear between texels of 0.05 and 0.1 rad: an eighth of the square, of what is 1.5 at most.
+        assert!((seen - want).abs() < 2.5e-3, "{azimuth} {elevation}: {seen} {want}");
     }
 }
 

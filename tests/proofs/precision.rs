@@ -123,7 +123,7 @@ fn light_transfer(t: &Transfer) {
     }
     let e = errors.map(|e| rms(&e));
     // Of one texel; three views of four texels each are blended.
-    row("light transfer of a texel", e, ("8 bits", e[0]), 1.5);
+    row("light transfer of a texel", e, ("8 bits", e[0]), 1.0);
 }
 
 /// A light above the horizon.
