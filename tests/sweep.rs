@@ -291,11 +291,20 @@ fn differences_of_images_are_told() {
         "ssim",
     ];
     assert_eq!(keys, expected);
+    // As much changes in the image as in the reference; and nothing in the reference.
+    let popping = |moved: [&str; 2]| -> f64 {
+        let args = ["difference", "a.exr", "b.exr", "--json", "--moved", moved[0], moved[1]];
+        let found: Value = serde_json::from_slice(&done(at, &args).stdout).unwrap();
+        found["popping"]["value"].as_f64().unwrap()
+    };
+    assert!(popping(["b.exr", "a.exr"]).abs() < 1e-6);
+    assert!(popping(["b.exr", "b.exr"]) > 0.01 && popping(["a.exr", "a.exr"]) < -0.01);
     assert_eq!(image::open(at.join("flip.png")).unwrap().to_rgb8().dimensions(), (48, 32));
     for (args, hint) in [
         (&["difference", "a.exr", "small.toml"][..], "not a linear image"),
         (&["difference", "a.exr", "none.exr"], "none.exr"),
         (&["difference", "a.exr", "b.exr", "-o", "flip.jpg"], "*.png"),
+        (&["difference", "a.exr", "b.exr", "--moved", "a.exr", "none.exr"], "none.exr"),
         (&["sweep", "small.toml", "-o", "s", "--knobs", "sample"], "\"samples\""),
         (&["sweep", "-o", "s", "--reference", "a.exr"], "one image, and there are 4 cameras"),
         (&["sweep", "small.toml", "-o", "s", "--reference", "a.exr"], "--size 48x32"),

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use canopy::image::Layers;
-use canopy::measure::metrics::{AVERAGED, Difference, Estimate, difference, display, flip, key_exposure};
+use canopy::measure::metrics::{
+    AVERAGED, Difference, Estimate, difference, display, flip, key_exposure, popping,
+};
 use canopy::{Error, Result};
 
 use super::SCHEMA_VERSION;
@@ -15,6 +17,7 @@ Examples:
   canopy render --quality fast --exr fast.exr; canopy render --quality accurate --exr accurate.exr
   canopy difference fast.exr accurate.exr             every metric of the first against the second
   canopy difference a.exr reference.exr -o flip.png   where they differ, as a map of FLIP
+  canopy difference a.exr reference.exr --moved a2.exr reference2.exr   and popping, from where the camera was before
   canopy difference a.exr reference.exr --json        for a script
 
 Errors of radiance are relative to the mean radiance of the reference in the same region. A reference with a layer `variance`
@@ -33,6 +36,9 @@ pub struct Args {
     /// Write the map of FLIP, black (the same) to white
     #[arg(short, long, value_name = "FILE.png")]
     output: Option<PathBuf>,
+    /// The same two after a small move of the camera: what changes in the image beyond what changes in the reference (popping)
+    #[arg(long, num_args = 2, value_names = ["ACTUAL", "REFERENCE"])]
+    moved: Option<Vec<PathBuf>>,
     #[command(flatten)]
     print: PrintOptions,
 }
@@ -47,6 +53,9 @@ struct Report {
     exposure: f64,
     #[serde(flatten)]
     difference: Difference,
+    /// Over the reference's mean radiance; given with --moved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    popping: Option<Estimate>,
 }
 
 pub fn run(args: &Args) -> Result<()> {
@@ -56,6 +65,10 @@ pub fn run(args: &Args) -> Result<()> {
     let (actual, reference) = (Layers::read(&args.actual)?, Layers::read(&args.reference)?);
     let exposure = args.exposure.unwrap_or_else(|| key_exposure(&reference.radiance));
     let difference = difference(&actual, &reference, exposure)?;
+    let popping = match args.moved.as_deref() {
+        Some([a, r]) => moved([&actual, &reference], [a, r])?,
+        _ => None,
+    };
     if let Some(png) = &args.output {
         let shown = [&reference, &actual].map(|l| display(&l.radiance, exposure));
         canopy::image::write_png(png, &flip(reference.size, &shown[0], &shown[1]).colours, reference.size)?;
@@ -68,6 +81,7 @@ pub fn run(args: &Args) -> Result<()> {
         size: reference.size,
         exposure,
         difference,
+        popping,
     };
     if args.print.json {
         output::json(&report)?;
@@ -80,6 +94,22 @@ pub fn run(args: &Args) -> Result<()> {
             Err(Error::Check(format!("{n} values are no finite numbers; metrics that meet one are left out")))
         }
     }
+}
+
+/// Popping between two pairs of images.
+fn moved([actual, reference]: [&Layers; 2], paths: [&PathBuf; 2]) -> Result<Option<Estimate>> {
+    let [actual_moved, reference_moved] = paths.map(|p| Layers::read(p));
+    let (actual_moved, reference_moved) = (actual_moved?, reference_moved?);
+    for (path, l) in paths.into_iter().zip([&actual_moved, &reference_moved]) {
+        if l.size != reference.size {
+            let ([w, h], [rw, rh]) = (l.size, reference.size);
+            return Err(Error::Usage(format!(
+                "{}: {w} x {h} pixels, and the reference has {rw} x {rh}; render it with --size {rw}x{rh}",
+                path.display()
+            )));
+        }
+    }
+    Ok(popping([actual, &actual_moved], [reference, &reference_moved]))
 }
 
 fn factor(text: &str) -> std::result::Result<f64, String> {
@@ -118,6 +148,10 @@ fn text(r: &Report) -> String {
     for (name, e) in [("FLIP", d.flip), ("structural similarity", d.ssim)] {
         let [value, interval] = shown(e, 1.0, 4);
         seen.row([name.into(), value, interval]);
+    }
+    if r.popping.is_some() {
+        let [value, interval] = shown(r.popping, 1.0, 4);
+        seen.row(["popping, of mean radiance".into(), value, interval]);
     }
     text += &format!("\n{}", seen.text());
     let mut far = Table::new(1, &["from, m", "radiance / reference", "95 % interval", "pixels"]);
