@@ -19,7 +19,7 @@
 //!   layer that is lit among what is seen of it, with L_vl the path of view and light together;
 //! - sky, E = E(x)' E(0)/E(0)'.
 //!
-//! Against the reference, an oak forest on a slope of 30° away from a sun at 45°: rms 3 %, where the turn leaves 9 %.
+//! Against the reference, an oak forest on a slope of 30° away from a sun at 45°: rms 3.6 %, where the turn leaves 9.4 %.
 //!
 //! # Density
 //! x = λA: trees per m², times their mean horizontal area A = π `crown_radius`² E(scale²).
