@@ -35,6 +35,9 @@ TableAngles table_angles(vec3 v, vec3 l, vec3 n, float k) {
     return a;
 }
 
+// Coordinate of a viewer's zenith angle in [0, n - 1].
+float table_zenith(float v, float n) { return (n - 1.0) * (clamp(v, 0.0, TABLE_MAX_ANGLE) / TABLE_MAX_ANGLE); }
+
 // Grid coordinates, in [0, n - 1], of the azimuth, the light's zenith angle and the viewer's. The second axis counts from
 // the viewer's angle on, finely near it, so that the hotspot's ridge v = l is a line of the grid.
 vec3 table_coordinates(TableAngles a, float n) {
@@ -43,7 +46,7 @@ vec3 table_coordinates(TableAngles a, float n) {
     float below = middle * (1.0 - sqrt(clamp(-d / max(v, 1e-6), 0.0, 1.0)));
     float above = middle + (n - 1.0 - middle) * sqrt(clamp(d / max(TABLE_MAX_ANGLE - v, 1e-6), 0.0, 1.0));
     return vec3((n - 1.0) * sqrt(clamp(a.phi * (1.0 / 3.141592653589793), 0.0, 1.0)), d > 0.0 ? above : below,
-                (n - 1.0) * (v / TABLE_MAX_ANGLE));
+                table_zenith(a.v, n));
 }
 
 // Coordinate of an optical thickness x = lambda A in [0, m - 1].
@@ -103,9 +106,8 @@ TableForest table_forest(sampler3D pairs, sampler2DArray views, vec3 v, vec3 l, 
     f.sun = vec2(0.0);
     f.sky = t.yz * ((tu.y + tu.z) / max(ts.y + ts.z, 1e-3));
     if (lit) {
-        float to_nodes = (count - 1.0) / TABLE_MAX_ANGLE;
-        float ls = table_view(views, to_nodes * clamp(s.l, 0.0, TABLE_MAX_ANGLE), 0.0, species, count, m).x;
-        float lu = table_view(views, to_nodes * clamp(u.l, 0.0, TABLE_MAX_ANGLE), 0.0, species, count, m).x;
+        float ls = table_view(views, table_zenith(s.l, count), 0.0, species, count, m).x;
+        float lu = table_view(views, table_zenith(u.l, count), 0.0, species, count, m).x;
         float light_path = (u.length_l * lu) / (s.length_l * ls);
         vec4 p = table_pair(pairs, at_s, at_x, species, count, m);
         vec4 ps = table_pair(pairs, at_s, 0.0, species, count, m), pu = table_pair(pairs, at_u, 0.0, species, count, m);

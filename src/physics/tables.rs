@@ -62,6 +62,11 @@ pub fn zenith_node(n: usize, i: usize) -> f64 {
     THETA_MAX * i as f64 / (n - 1) as f64
 }
 
+/// Zenith angle of v, rad, given that of S v.
+pub fn unscaled_zenith(theta: f64, vertical_scale: f64) -> f64 {
+    (vertical_scale * theta.sin()).atan2(theta.cos())
+}
+
 /// Index of the node of the light's zenith angle that equals the view's.
 pub fn ridge(n: usize) -> usize {
     (n - 1) / 2

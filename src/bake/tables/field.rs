@@ -108,6 +108,15 @@ struct Projection {
     layer: u32,
 }
 
+impl Projection {
+    /// Texture coordinates of a point.
+    #[inline(always)]
+    fn at(&self, [a, b, s]: [f32; 3]) -> (f32, f32) {
+        let of = |row: [f32; 3]| 0.5 + a * row[0] + b * row[1] + s * row[2];
+        (of(self.u), of(self.v))
+    }
+}
+
 /// The three views around a direction.
 pub struct FieldAim {
     views: [Projection; 3],
@@ -200,8 +209,7 @@ impl FieldCrown {
     ) -> Look {
         let (mut sum_k, mut sum_s, mut alpha, mut occlusion) = (0.0, 0.0, 0.0, 0.0);
         for view in &aim.views {
-            let x = 0.5 + a * view.u[0] + b * view.u[1] + s * view.u[2];
-            let y = 0.5 + a * view.v[0] + b * view.v[1] + s * view.v[2];
+            let (x, y) = view.at([a, b, s]);
             let [r, o, t_alpha] =
                 if filter { level.near(view.layer, x, y) } else { level.nearest(view.layer, x, y) };
             let z = SQRT_2 * (2.0 * r - t_alpha);
@@ -293,8 +301,7 @@ impl Crown for FieldCrown {
     fn transfer(&self, aim: &FieldAim, [a, b, s]: [f32; 3]) -> TransferAt {
         let (mut sum, mut alpha) = ([0.0; 2 * TERMS], 0.0);
         for view in aim.views.iter().filter(|_| !self.transfer.bands.is_empty()) {
-            let x = 0.5 + a * view.u[0] + b * view.u[1] + s * view.u[2];
-            let y = 0.5 + a * view.v[0] + b * view.v[1] + s * view.v[2];
+            let (x, y) = view.at([a, b, s]);
             let share = view.weight * self.fine.near(view.layer, x, y)[2];
             alpha += share;
             let found = self.transfer.nearest(view.layer, x, y);

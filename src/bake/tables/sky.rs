@@ -17,7 +17,7 @@ use std::f64::consts::{PI, TAU};
 use super::crown::LeafOptics;
 use super::{ForestSettings, ForestTables};
 use crate::physics::light;
-use crate::physics::tables::{angles, density_node, pair, zenith_node};
+use crate::physics::tables::{angles, density_node, pair, unscaled_zenith as zenith, zenith_node};
 
 /// Bins an octave of Λd², and octaves from 2⁻¹⁶ on.
 const BINS: f64 = 8.0;
@@ -104,11 +104,6 @@ pub fn fill(t: &mut ForestTables, seen: &[SkySeen], leaf: &LeafOptics, forest: &
         let ratio = seen[k % n].left(hole, part) / seen[k % n].left(measured, part).max(1e-6);
         t.view[k][1..3].iter_mut().for_each(|e| *e *= ratio as f32);
     }
-}
-
-/// Zenith angle of v, given that of S v.
-fn zenith(label: f64, vertical_scale: f64) -> f64 {
-    (vertical_scale * label.sin()).atan2(label.cos())
 }
 
 /// A view: cosine of its zenith angle, E, and what was seen.

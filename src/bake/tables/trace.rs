@@ -8,6 +8,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::crown::{Crown, TransferAt};
 use super::patch::{Patch, Segment, TURNS, Tree};
+use crate::physics::tables::unscaled_zenith;
 
 /// A direction of parallel rays: their slope in metres and in the scaled space of the tree.
 pub struct Heading<A> {
@@ -25,7 +26,7 @@ pub struct Heading<A> {
 impl<A> Heading<A> {
     /// Rays at a zenith angle θ < 90°, rad, in the space scaled vertically by `vertical_scale`.
     pub fn new<C: Crown<Aim = A>>(crown: &C, theta: f64, vertical_scale: f64) -> Self {
-        let zenith = (vertical_scale * theta.sin()).atan2(theta.cos());
+        let zenith = unscaled_zenith(theta, vertical_scale);
         let tree_zenith = Self::tree_zenith(crown, zenith);
         let aims =
             (0..TURNS).map(|k| crown.aim(tree_zenith, TAU * f64::from(k) / f64::from(TURNS))).collect();
