@@ -146,6 +146,7 @@ fn shader(
         let kind = match b.descriptor_type {
             ReflectDescriptorType::StorageBuffer => "STORAGE_BUFFER",
             ReflectDescriptorType::UniformBuffer => "UNIFORM_BUFFER",
+            ReflectDescriptorType::UniformTexelBuffer => "UNIFORM_TEXEL_BUFFER",
             ReflectDescriptorType::CombinedImageSampler => "COMBINED_IMAGE_SAMPLER",
             ReflectDescriptorType::StorageImage => "STORAGE_IMAGE",
             other => return Err(format!("{name}: binding {} has an unused kind {other:?}", b.name).into()),

@@ -14,6 +14,11 @@ const uint NO_PAGE = 0xffffffffu;     // no layer of a texture array
 const uint COVER_GUTTER = 8u;         // texels around a coverage tile's quad on each side: one of mip 3
 const uint COVER_LEVELS = 4u;         // mip levels of a coverage tile
 const uint COVER_GROUPS = 3u;         // most layers of a tile: its coverage and a channel a species, four a layer
+const uint ORDER_LANES = 128u;        // invocations that sort trees by depth, each a part of the list without gaps
+const uint DEPTH_BINS = 768u;         // bins of that sort: 32 an octave, from 1/64 m on
+const uint BIN_LANES = 64u;           // invocations that write the tiles' lists, each a part of all entries without gaps
+const uint TILE_SIDE = 8u;            // pixels along a side of a tile
+const uint SIGHT_TEXELS = 8u;         // 16-byte words of a tree's record for finding its visible samples
 const uint COVER_SCRATCH = 16u;       // coverage tiles of one scratch word a texel that the scratch buffer holds
 
 // Everything of a frame that does not depend on the object drawn. World positions are relative to the camera. Bound as
@@ -179,6 +184,24 @@ struct CullParameters {
     uint near_bins;                   // distance bins of the camera's first draw
     uint far_bins;                    // first distance bin of its third
     uint converged_bins;              // first distance bin of its last
+};
+
+// What the tile rasteriser takes.
+struct TileParameters {
+    uvec2 size;                       // of the image, pixels
+    uint lists_across;                // lists of tiles along a row
+    uint list_shift;                  // log2 of the pixels along a side of the tiles that share a list
+    float near;                       // distance of the near plane, m
+    uint step_capacity;               // steps of writing the lists: trees, and entries that all lists together hold
+};
+
+// What of a frame's trees the tiles' passes find on their way.
+struct TileState {
+    uint tree_count;                  // trees in view
+    uint step_count;                  // trees, and entries of all lists
+    uint whole;                       // 1: they are more than fit, and each tile looks at all trees
+    uint overrun;                     // 1: a tile took more turns than drivers allow, and its picture is not complete
+    uvec3 tree_groups;                // workgroups of a dispatch over all trees
 };
 
 // One terrain quad to draw.

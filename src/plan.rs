@@ -72,6 +72,23 @@ impl Representation {
     }
 }
 
+/// What finds the samples of trees that are drawn one by one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rasterizer {
+    /// The graphics pipeline: a quad a tree, every fragment lit.
+    Graphics,
+    /// Compute tiles: front to back, visibility first, then each pixel's trees lit once.
+    Tiles,
+}
+
+impl Rasterizer {
+    /// Tiles where the device is a CPU, on which the layers of trees behind each other cost most; else the graphics pipeline.
+    pub fn auto(device: Option<&DeviceInfo>) -> Self {
+        if device.is_none_or(|d| d.kind == "cpu") { Rasterizer::Tiles } else { Rasterizer::Graphics }
+    }
+}
+
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -125,6 +142,9 @@ pub struct Plan {
     pub representation: Representation,
     /// What the picture shows; [`Plan::new`] says radiance, and whoever wants another mode sets it before the renderer is made.
     pub view_mode: ViewMode,
+    /// What finds the samples of trees; [`Plan::new`] says [`Rasterizer::auto`], and whoever wants the other sets it before the
+    /// renderer is made.
+    pub rasterizer: Rasterizer,
     /// Image size, pixels.
     pub size: [u32; 2],
     /// Samples a pixel.
@@ -236,6 +256,11 @@ impl Plan {
             items: Vec::new(),
             representation,
             view_mode: ViewMode::Radiance,
+            rasterizer: if std::env::var("CANOPY_GRAPHICS").is_ok() || layers {
+                Rasterizer::Graphics
+            } else {
+                Rasterizer::auto(device)
+            },
             size: eye.size,
             samples: samples(s.samples, device),
             layers,

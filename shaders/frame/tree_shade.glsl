@@ -5,6 +5,7 @@
 #include "physics/zfield.glsl"
 #include "physics/shadow.glsl"
 #include "physics/transfer.glsl"
+#include "frame/tree_light.glsl"
 
 layout(location = 0) in vec4 view_p[3];
 layout(location = 3) in vec3 light_p[3];
@@ -60,53 +61,21 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
     lit = HAS_SUN ? mean_sky.w : 0.0;
     uint species = (tree_bits.w >> 8u) + 1u;
     if (CONVERGED) return species;
-    // Under the crown there is only bark; half a metre or so of transition.
-    float height = mix(view_p[0].w, optics.w, s);
-    vec3 colour = mean_sun.w * mix(bark.rgb, vec3(1.0), smoothstep(bark.w - 0.05, bark.w + 0.05, height));
-    if (HAS_SUN) {
-        float metres = 0.0;
-        if (LIGHT_ITERATIONS > 0) {
-            vec3 lp[3], ld[3];
-            for (int i = 0; i < 3; i++) {
-                lp[i] = mix(light_p[i], light_c[i].xyz, s);
-                ld[i] = light_d[i];
-            }
-            vec3 lw = vec3(weights.zw, 1.0 - weights.z - weights.w);
-            vec3 light_layers = vec3(light_c[0].w, light_c[1].w, light_c[2].w);
-            // Start on the plane through the centre across the light.
-            metres = -dot(lw, vec3(lp[0].z, lp[1].z, lp[2].z)) / dot(lw, vec3(ld[0].z, ld[1].z, ld[2].z));
-            vec3 inverse_light = 1.0 / vec3(ld[0].z, ld[1].z, ld[2].z);
-            for (int k = 0; k < LIGHT_ITERATIONS; k++) {
-                // Unfiltered where a texel is no larger than a pixel.
-                if (MAGNIFIED) {
-                    metres = zfield_fetch(views, lp, ld, inverse_light, light_layers, lw, optics.x, metres, false, k > 0).s;
-                } else {
-                    metres = zfield_estimate(views, lp, ld, inverse_light, light_layers, lw, optics.x, metres, false);
-                }
-            }
-            metres = max(metres, 0.0);
-        }
-        float through = self_shadow(own.y, optics.y, metres);
-        vec3 entry = mix(shadow_p, shadow_c.xyz, s);
-        entry.z += metres * shadow_c.w;
-        uint cascade = tree_bits.w & 15u;
-        float visible = sun_visibility(shadow_map, entry, vec2(0.0), min(cascade, 3u));
-        through *= cascade < 4u ? visible : 1.0;
-        float reached = through;
-        // From below, views show the other side.
-        if (TRANSFER_BANDS > 0u && !below) {
-            vec3 shares = at.shares / max(at.shares.x + at.shares.y + at.shares.z, 1e-6);
-            // Half as many texels a side as a view has.
-            float mip = max(optics.x - 1.0, 0.0);
-            float x = transfer_fetch(transfer_1, transfer_first(sun_from.xyz), p, d, layers, shares, mip, s);
-            if (TRANSFER_BANDS > 1u) x += transfer_fetch(transfer_2, transfer_second(sun_from.xyz), p, d, layers, shares, mip, s);
-            reached *= max(1.0 + sun_from.w * x, 0.0);
-        }
-        sun_part += sun.rgb * colour * reached;
-        lit += mean_sun.w * through;
+    LightRay ray;
+    for (int i = 0; i < 3; i++) {
+        ray.from[i] = mix(light_p[i], light_c[i].xyz, s);
+        ray.metre[i] = light_d[i];
     }
-    // Depth under the top of the canopy, for the sky through the hole around the tree.
-    float below_top = max(1.0 - height, 0.0) * sky.w;
-    sky_part += sky.rgb * colour * (at.occlusion / (1.0 + below_top * below_top * sun.w));
+    ray.layers = vec3(light_c[0].w, light_c[1].w, light_c[2].w);
+    ray.weights = vec3(weights.zw, 1.0 - weights.z - weights.w);
+    ray.entry = mix(shadow_p, shadow_c.xyz, s);
+    ray.deeper = shadow_c.w;
+    TreeLight tree = TreeLight(sun.rgb, sky.rgb, mean_sun.rgb, mean_sky.rgb, mean_sky.w, mean_sun.w, bark.rgb, bark.w, sky.w,
+                               sun.w, own.y, optics.y, sun_from.xyz, sun_from.w, tree_bits.w & 15u);
+    TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, tree, at, p, d, layers, below, optics.x, MAGNIFIED, s,
+                                 mix(view_p[0].w, optics.w, s), ray, LightQuality(HAS_SUN, LIGHT_ITERATIONS, TRANSFER_BANDS));
+    sun_part = parts.sun;
+    sky_part = parts.sky;
+    lit = parts.lit;
     return species;
 }

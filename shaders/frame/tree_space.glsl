@@ -37,3 +37,8 @@ vec4 tree_bounds(vec4 a, vec4 b, vec4 c, vec3 w, bool below, int rings) {
     if (below) seen.xy = -seen.yx;
     return vec4(max(seen.xz, cylinder.xz), min(seen.yw, cylinder.yw)).xzyw;
 }
+
+// Three 10-bit layers, as floats for the sampler.
+vec3 unpack_layers(uint packed, uint first) {
+    return vec3(uvec3(packed, packed >> 10u, packed >> 20u) & 0x3ffu) + float(first);
+}

@@ -4,6 +4,11 @@
 // point to m_i = (u - 1/2, v - 1/2, depth), linearly, so that m_i(p + s d) = m_i(p) + s m_i(d): callers pass these two.
 // Texels are (nearest depth, farthest depth, occlusion) times opacity, opacity; depths stored as (d + sqrt 2) / (2 sqrt 2).
 
+// How a view is sampled between its texels.
+#ifndef VIEW_SAMPLE
+#define VIEW_SAMPLE(views, at, layer, mip) textureLod(views, vec3(at, layer), mip)
+#endif
+
 const float SQRT2 = 1.4142135623730951;
 
 struct Surface {
@@ -48,7 +53,7 @@ Surface zfield_fetch(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_de
     vec3 shares;
     for (int i = 0; i < 3; i++) {
         vec2 uv = p[i].xy + s * d[i].xy + 0.5;
-        vec4 t = textureLod(views, vec3(uv, layers[i]), mip);
+        vec4 t = VIEW_SAMPLE(views, uv, layers[i], mip);
         float z = (farthest ? t.g : t.r) * (2.0 * SQRT2) - SQRT2 * t.a;
         // a e / (1 + e) with e = x2 / (a AGREEMENT)^2 and x = z - a depth(q), without dividing by a.
         float x = (z - t.a * (p[i].z + s * d[i].z)) * (1.0 / AGREEMENT);
@@ -79,9 +84,4 @@ Surface zfield_search(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 layers, v
         s = zfield_move(s, at.s, at.opacity);
     }
     return zfield_fetch(views, p, d, inverse_depth, layers, weights, mip, s, farthest, estimates + filtered > 0u);
-}
-
-// Three 10-bit layers, as floats for the sampler.
-vec3 unpack_layers(uint packed, uint first) {
-    return vec3(uvec3(packed, packed >> 10u, packed >> 20u) & 0x3ffu) + float(first);
 }

@@ -1,9 +1,9 @@
 //! The terrain pass.
 
-use super::Forest;
 use super::shader_map::ShaderMap;
 use super::shadows::TerrainPush;
 use super::targets::ImageTargets;
+use super::{Forest, NearTrees};
 use crate::Result;
 use crate::forest::coverage;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
@@ -95,7 +95,7 @@ impl Ground {
             (_, 1) => sky.map(|c| [c[0], c[1], c[2], 0.0]),
             _ => sky.map(|_| [0.0; 4]),
         };
-        let last = forest.is_none_or(|(f, _)| f.near.is_none());
+        let last = forest.is_none_or(|(f, _)| f.near.as_ref().is_none_or(NearTrees::read_ground));
         let colors: Vec<_> =
             targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), last)).collect();
         let depth = Some(targets.depth.attachment(Some([0.0; 4]), last));

@@ -7,6 +7,7 @@ pub mod shader_map;
 pub mod shadows;
 pub mod sky;
 pub mod targets;
+pub mod tiles;
 pub mod tonemap;
 pub mod trees;
 pub mod view;
@@ -26,7 +27,7 @@ use crate::forest::terrain::TerrainData;
 use crate::gpu::interface::View;
 use crate::gpu::{Buffer, Gpu, Timing};
 use crate::image::Picture;
-use crate::plan::Plan;
+use crate::plan::{Plan, Rasterizer};
 use crate::scene::{Camera, Scene, Sun};
 use crate::{Error, Result};
 use camera::Eye;
@@ -36,6 +37,7 @@ use shader_map::ShaderMap;
 use shadows::Shadows;
 use sky::SkyPass;
 use targets::ImageTargets;
+use tiles::TreeTiles;
 use tonemap::Tonemap;
 use trees::Trees;
 use view::Light;
@@ -58,7 +60,22 @@ pub struct Forest {
 pub struct NearTrees {
     /// Culling.
     pub cull: CullData,
-    pass: Trees,
+    pass: TreePass,
+}
+
+impl NearTrees {
+    /// Whether they are put over the ground's finished picture, not drawn into its samples.
+    fn read_ground(&self) -> bool {
+        matches!(self.pass, TreePass::Tiles(_))
+    }
+}
+
+/// What draws them.
+enum TreePass {
+    /// The graphics pipeline.
+    Graphics(Trees),
+    /// Compute tiles.
+    Tiles(TreeTiles),
 }
 
 /// Draws a scene as its plan says.
@@ -129,7 +146,14 @@ impl Renderer {
             let near = || -> Result<NearTrees> {
                 Ok(NearTrees {
                     cull: CullData::new(gpu, &scene, &plan, &tables)?,
-                    pass: Trees::new(gpu, &scene, &plan, species.mask_rows)?,
+                    pass: match plan.rasterizer {
+                        Rasterizer::Graphics => {
+                            TreePass::Graphics(Trees::new(gpu, &scene, &plan, species.mask_rows)?)
+                        }
+                        Rasterizer::Tiles => {
+                            TreePass::Tiles(TreeTiles::new(gpu, &scene, &plan, species.mask_rows)?)
+                        }
+                    },
                 })
             };
             let near = plan.z_fields.then(near).transpose()?;
@@ -280,7 +304,14 @@ impl Renderer {
             }
             self.ground.record(r, &self.view, ground, forest, shadow_map, &self.targets, clear);
             if let Some((forest, near)) = self.forest.as_ref().and_then(|f| f.near.as_ref().map(|n| (f, n))) {
-                near.pass.record(r, &self.view, forest, &near.cull, shadow_map, &self.targets);
+                match &near.pass {
+                    TreePass::Graphics(trees) => {
+                        trees.record(r, &self.view, forest, &near.cull, shadow_map, &self.targets);
+                    }
+                    TreePass::Tiles(tiles) => {
+                        tiles.record(r, &self.view, forest, &near.cull, shadow_map, &self.targets);
+                    }
+                }
             }
         });
         self.tonemap.record(&mut recorder, &self.targets, plan, exposure / self.light.scale);
@@ -292,6 +323,9 @@ impl Renderer {
 
         let trees = match &self.forest {
             Some(Forest { seeds, near: Some(near), .. }) if seeds.visible > 0 => {
+                if let TreePass::Tiles(tiles) = &near.pass {
+                    tiles.check(gpu)?;
+                }
                 near.cull.counts(gpu, cascades.len())?
             }
             _ => TreeCounts::default(),

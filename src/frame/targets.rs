@@ -24,13 +24,26 @@ impl ColorTarget {
         format: vk::Format,
         usage: vk::ImageUsageFlags,
     ) -> Result<Self> {
-        let make = |samples| {
+        let make = |samples, usage| {
             gpu.image(&ImageDesc { name, format, size: plan.size, layers: 1, levels: 1, samples, usage })
         };
+        let resolved = usage
+            | if format == vk::Format::D32_SFLOAT {
+                vk::ImageUsageFlags::empty()
+            } else {
+                vk::ImageUsageFlags::STORAGE
+            };
         Ok(ColorTarget {
-            multisampled: (plan.samples > 1).then(|| make(plan.samples)).transpose()?,
-            image: make(1)?,
+            multisampled: (plan.samples > 1)
+                .then(|| make(plan.samples, usage | vk::ImageUsageFlags::SAMPLED))
+                .transpose()?,
+            image: make(1, resolved)?,
         })
+    }
+
+    /// The image whose samples are drawn: the multisampled one, or, with one sample a pixel, the only one.
+    pub fn drawn(&self) -> &Image {
+        self.multisampled.as_ref().unwrap_or(&self.image)
     }
 
     /// As an attachment that starts from `clear` (or keeps its content), resolving at the end if `resolve`.

@@ -13,6 +13,8 @@ use crate::{Error, Result};
 pub struct Buffer {
     shared: Arc<Shared>,
     pub(super) handle: vk::Buffer,
+    /// View through which shaders read it as texels; null if they do not.
+    pub(super) texels: vk::BufferView,
     allocation: Option<Allocation>,
     bytes: u64,
 }
@@ -53,7 +55,7 @@ pub struct Image {
 
 /// A resource waiting for its last submission.
 pub(super) enum Retired {
-    Buffer(vk::Buffer, Allocation),
+    Buffer(vk::Buffer, vk::BufferView, Allocation),
     Image(vk::Image, Vec<vk::ImageView>, Allocation),
     Program(vk::Pipeline, vk::PipelineLayout, vk::DescriptorSetLayout),
     Pool(vk::DescriptorPool),
@@ -65,7 +67,8 @@ impl Retired {
         // SAFETY: the caller has waited for the last submission that could use the handles, and owns them.
         unsafe {
             let allocation = match self {
-                Retired::Buffer(b, a) => {
+                Retired::Buffer(b, view, a) => {
+                    shared.device.destroy_buffer_view(view, None);
                     shared.device.destroy_buffer(b, None);
                     a
                 }
@@ -112,11 +115,40 @@ impl Gpu {
         self.make_buffer(name, bytes, MemoryLocation::GpuOnly)
     }
 
+    /// The same, which shaders may also read as an array of texels of `texel` bytes and a format. Where drivers run shaders on the
+    /// CPU, that takes a fraction of what reading a storage buffer does.
+    ///
+    /// # Errors
+    /// As [`Gpu::buffer`]; [`Error::Usage`] for more texels than the device reads.
+    pub fn texel_buffer(&self, name: &str, bytes: u64, (format, texel): (vk::Format, u64)) -> Result<Buffer> {
+        let most = u64::from(self.info().max_texel_elements);
+        let mut buffer = self.buffer(name, bytes)?;
+        if buffer.bytes / texel > most {
+            return Err(Error::Usage(format!(
+                "buffer \"{name}\" has {} texels; {} reads at most {most}",
+                buffer.bytes / texel,
+                self.info().name
+            )));
+        }
+        let s = &self.shared;
+        let create =
+            vk::BufferViewCreateInfo::default().buffer(buffer.handle).format(format).range(vk::WHOLE_SIZE);
+        let free = s.failures.memory();
+        let made = free.and_then(|()| {
+            // SAFETY: the device and the buffer are alive; dropping the buffer destroys the view with it.
+            unsafe { s.device.create_buffer_view(&create, None) }
+        });
+        buffer.texels = made.map_err(device_error(name))?;
+        s.name(buffer.texels, name);
+        Ok(buffer)
+    }
+
     pub(super) fn make_buffer(&self, name: &str, bytes: u64, location: MemoryLocation) -> Result<Buffer> {
         let s = &self.shared;
         let bytes = bytes.max(16).next_multiple_of(16);
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER
             | vk::BufferUsageFlags::UNIFORM_BUFFER
+            | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
             | vk::BufferUsageFlags::INDEX_BUFFER
             | vk::BufferUsageFlags::INDIRECT_BUFFER
             | vk::BufferUsageFlags::TRANSFER_SRC
@@ -139,7 +171,8 @@ impl Gpu {
             let bound = free
                 .and_then(|()| s.device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()));
             s.name(handle, name);
-            let buffer = Buffer { shared: s.clone(), handle, allocation: Some(allocation), bytes };
+            let texels = vk::BufferView::null();
+            let buffer = Buffer { shared: s.clone(), handle, texels, allocation: Some(allocation), bytes };
             bound.map_err(device_error(name))?;
             Ok(buffer)
         }
@@ -372,7 +405,7 @@ impl Image {
 impl Drop for Buffer {
     fn drop(&mut self) {
         if let Some(a) = self.allocation.take() {
-            self.shared.retire(Retired::Buffer(self.handle, a));
+            self.shared.retire(Retired::Buffer(self.handle, self.texels, a));
         }
     }
 }

@@ -18,6 +18,8 @@ use crate::{Error, Result};
 pub enum Resource<'a> {
     /// A storage or uniform buffer, whole.
     Buffer(&'a Buffer),
+    /// A buffer read as texels.
+    Texels(&'a Buffer),
     /// A sampled image.
     Texture(&'a Image, Sampler),
     /// A storage image without mip levels.
@@ -415,10 +417,12 @@ impl Work<'_, '_> {
         let s = &self.recorder.gpu.shared;
         let mut buffers = Vec::with_capacity(program.bindings.len());
         let mut images = Vec::with_capacity(program.bindings.len());
+        let mut views = Vec::with_capacity(program.bindings.len());
         for b in &program.bindings {
             let found = resources.iter().find(|(name, _)| *name == b.name).map(|(_, r)| *r);
             let (mut buffer, mut image) =
                 (vk::DescriptorBufferInfo::default(), vk::DescriptorImageInfo::default());
+            let mut texels = vk::BufferView::null();
             let fits = match (found, b.kind) {
                 (
                     Some(Resource::Buffer(r)),
@@ -426,6 +430,10 @@ impl Work<'_, '_> {
                 ) => {
                     buffer = buffer.buffer(r.handle).range(vk::WHOLE_SIZE);
                     true
+                }
+                (Some(Resource::Texels(r)), vk::DescriptorType::UNIFORM_TEXEL_BUFFER) => {
+                    texels = r.texels;
+                    texels != vk::BufferView::null()
                 }
                 (Some(Resource::Texture(r, sampler)), vk::DescriptorType::COMBINED_IMAGE_SAMPLER) => {
                     image = image
@@ -454,14 +462,17 @@ impl Work<'_, '_> {
             }
             buffers.push([buffer]);
             images.push([image]);
+            views.push([texels]);
         }
         let writes: Vec<_> = program
             .bindings
             .iter()
-            .zip(buffers.iter().zip(&images))
-            .map(|(b, (buffer, image))| {
+            .zip(buffers.iter().zip(&images).zip(&views))
+            .map(|(b, ((buffer, image), texels))| {
                 let write = vk::WriteDescriptorSet::default().dst_binding(b.binding).descriptor_type(b.kind);
-                if buffer[0].buffer == vk::Buffer::null() {
+                if texels[0] != vk::BufferView::null() {
+                    write.texel_buffer_view(texels)
+                } else if buffer[0].buffer == vk::Buffer::null() {
                     write.image_info(image)
                 } else {
                     write.buffer_info(buffer)
@@ -550,6 +561,14 @@ impl ComputePass<'_, '_> {
         r.dispatches += 1;
         // SAFETY: a program and its resources are bound.
         unsafe { r.device().cmd_dispatch(r.cmd, groups[0], groups[1], groups[2]) };
+    }
+
+    /// Runs the bound program with the number of workgroups that stands at byte `offset` of `commands`.
+    pub fn dispatch_indirect(&mut self, commands: &Buffer, offset: u64) {
+        let r = &mut *self.work.recorder;
+        r.dispatches += 1;
+        // SAFETY: a program and its resources are bound; the buffer is alive and holds what the shader that wrote it put there.
+        unsafe { r.device().cmd_dispatch_indirect(r.cmd, commands.handle, offset) };
     }
 
     /// A barrier between two dispatches of the same pass.

@@ -28,6 +28,8 @@ pub struct DeviceInfo {
     pub max_layers: u32,
     /// Largest storage buffer, bytes.
     pub max_storage_bytes: u64,
+    /// Most texels that shaders read of a buffer.
+    pub max_texel_elements: u32,
     /// Sum of the device-local heaps, bytes.
     pub device_bytes: u64,
     /// Sample counts that colour and depth both take, as a bit mask (1 | 4 | 8 …).
@@ -194,6 +196,7 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
         max_volume_side: l.max_image_dimension3_d,
         max_layers: l.max_image_array_layers,
         max_storage_bytes: l.max_storage_buffer_range as u64,
+        max_texel_elements: l.max_texel_buffer_elements,
         device_bytes: memory.memory_heaps[..memory.memory_heap_count as usize]
             .iter()
             .filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))

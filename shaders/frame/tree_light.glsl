@@ -1,0 +1,97 @@
+// Light on what is seen of a z-field tree (BN12, section 5). Needs physics/{light,zfield,shadow,transfer}.glsl.
+
+// What is the same all over a tree.
+struct TreeLight {
+    vec3 sun;           // radiance of a lit leaf
+    vec3 sky;           // radiance of a leaf under the whole sky
+    vec3 mean_sun;      // average radiance from the sun, times nu of BN12 eq. 22
+    vec3 mean_sky;      // average radiance from the sky, times nu
+    float mean_lit;     // average lit fraction, times nu
+    float own;          // 1 - nu: weight of the tree's own light
+    vec3 bark;          // reflectance of bark over that of leaves
+    float crown_base;   // height under which there is only bark
+    float half_height;  // metres from the centre to the top
+    float hole;         // 1 / squared radius of the hole around it, 1/m2
+    float leaf;         // c of the self-shadow times the root of the phase angle
+    float extinction;   // tau of the self-shadow times the phase angle, 1/m
+    vec3 toward;        // the sun, in the tree's own axes
+    float transfer;     // reach of light transfer
+    uint cascade;       // for shadow lookups; MAX_CASCADES: none
+};
+
+// The ray from a seen point to the sun.
+struct LightRay {
+    vec3 from[3];       // the point, in three views around the light's direction
+    vec3 metre[3];      // one metre towards the sun, in the same
+    vec3 layers;
+    vec3 weights;
+    vec3 entry;         // the point in its cascade
+    float deeper;       // change of the depth there a metre towards the sun
+};
+
+// What is asked of the light.
+struct LightQuality {
+    bool sun;           // it shines
+    int iterations;     // to where its light enters the crown
+    uint bands;         // of light transfer
+};
+
+struct TreeParts {
+    vec3 sun, sky;      // parts of the radiance
+    float lit;          // fraction of the sun that arrives
+};
+
+// Where its light enters the crown: metres from the point to there.
+float light_entry(sampler2DArray views, LightRay ray, float mip, int iterations, bool magnified) {
+    vec3 lp[3], ld[3];
+    for (int i = 0; i < 3; i++) {
+        lp[i] = ray.from[i];
+        ld[i] = ray.metre[i];
+    }
+    vec3 lw = ray.weights;
+    // Start on the plane through the centre across the light.
+    float metres = -dot(lw, vec3(lp[0].z, lp[1].z, lp[2].z)) / dot(lw, vec3(ld[0].z, ld[1].z, ld[2].z));
+    vec3 inverse_light = 1.0 / vec3(ld[0].z, ld[1].z, ld[2].z);
+    // Unfiltered where a texel is no larger than a pixel.
+    int filtered = magnified ? iterations : 0;
+    for (int k = 0; k < filtered; k++) {
+        metres = zfield_fetch(views, lp, ld, inverse_light, ray.layers, lw, mip, metres, false, k > 0).s;
+    }
+    for (int k = filtered; k < iterations; k++) {
+        metres = zfield_estimate(views, lp, ld, inverse_light, ray.layers, lw, mip, metres, false);
+    }
+    return max(metres, 0.0);
+}
+
+// Light at the surface that a view ray p + s d meets at s; `height` is in scaled tree space.
+TreeParts tree_light(sampler2DArray views, sampler2DArray shadow_map, sampler2DArray transfer_1, sampler2DArray transfer_2,
+                     TreeLight t, Surface at, vec3 p[3], vec3 d[3], vec3 layers, bool below, float mip, bool magnified, float s,
+                     float height, LightRay ray, LightQuality quality) {
+    TreeParts light = TreeParts(t.mean_sun, t.mean_sky, quality.sun ? t.mean_lit : 0.0);
+    // Under the crown there is only bark; half a metre or so of transition.
+    vec3 colour = t.own * mix(t.bark, vec3(1.0), smoothstep(t.crown_base - 0.05, t.crown_base + 0.05, height));
+    if (quality.sun) {
+        float metres = quality.iterations > 0 ? light_entry(views, ray, mip, quality.iterations, magnified) : 0.0;
+        float through = self_shadow(t.leaf, t.extinction, metres);
+        vec3 entry = ray.entry;
+        entry.z += metres * ray.deeper;
+        float visible = sun_visibility(shadow_map, entry, vec2(0.0), min(t.cascade, 3u));
+        through *= t.cascade < 4u ? visible : 1.0;
+        float reached = through;
+        // From below, views show the other side.
+        if (quality.bands > 0u && !below) {
+            vec3 shares = at.shares / max(at.shares.x + at.shares.y + at.shares.z, 1e-6);
+            // Half as many texels a side as a view has.
+            float coarser = max(mip - 1.0, 0.0);
+            float x = transfer_fetch(transfer_1, transfer_first(t.toward), p, d, layers, shares, coarser, s);
+            if (quality.bands > 1u) x += transfer_fetch(transfer_2, transfer_second(t.toward), p, d, layers, shares, coarser, s);
+            reached *= max(1.0 + t.transfer * x, 0.0);
+        }
+        light.sun += t.sun * colour * reached;
+        light.lit += t.own * through;
+    }
+    // Depth under the top of the canopy, for the sky through the hole around the tree.
+    float below_top = max(1.0 - height, 0.0) * t.half_height;
+    light.sky += t.sky * colour * (at.occlusion / (1.0 + below_top * below_top * t.hole));
+    return light;
+}
