@@ -10,9 +10,9 @@ use crate::frame::camera::Eye;
 use crate::frame::shader_map;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
-use crate::physics::terrain::height_at;
+use crate::physics::raster::Raster;
 use crate::physics::views;
-use crate::scene::{Albedo, Camera, Distribution, Raster, Scene, Sky};
+use crate::scene::{Albedo, Camera, Distribution, Scene, Sky};
 use crate::{Error, Result};
 
 /// Seed quads along the range, at most.
@@ -332,7 +332,7 @@ impl Plan {
     fn scene_in_range(&self, scene: &Scene, place: [f64; 3]) -> bool {
         let terrain = &scene.terrain;
         let [x, y] = [0, 1].map(|k| place[k].clamp(0.0, terrain.extent[k]));
-        self.trees_in_range(terrain.extent, [height_at(terrain, x, y); 2], place)
+        self.trees_in_range(terrain.extent, [terrain.height_at(x, y); 2], place)
             || terrain
                 .heights
                 .as_ref()

@@ -18,11 +18,12 @@ use rayon::prelude::*;
 
 use super::rays::Rays;
 use super::surface::Surface;
-use super::{SpeciesBake, Turned, ZField};
+use super::{SpeciesBake, Turned};
 use crate::Result;
 use crate::physics::hash::{Stream, hash2};
 use crate::physics::light;
 use crate::physics::views::{self, Basis};
+use crate::physics::zfield::ZField;
 use crate::physics::zfield::{self, Ray};
 use crate::scene::Mesh;
 

@@ -13,13 +13,14 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::SpeciesBake;
 use super::raster::{NO_FACE, Raster, SUBSAMPLES, View};
 use super::rays::Rays;
 use super::surface::Surface;
 use super::tables::{Crown, FieldAim, FieldCrown, Shape};
 use super::views::rasters;
-use super::{SpeciesBake, Transfer};
 use crate::physics::light;
+use crate::physics::transfer::Transfer;
 use crate::physics::transfer::{self, TERMS};
 use crate::physics::views;
 use crate::progress::Progress;

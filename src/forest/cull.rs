@@ -15,8 +15,9 @@ use crate::gpu::interface::{
 };
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
 use crate::physics::hash::{HASH_FADE, hash, unit};
+use crate::physics::raster::Raster;
 use crate::plan::Plan;
-use crate::scene::{Raster, Scene};
+use crate::scene::Scene;
 use crate::{Error, Result};
 
 const _: () = assert!(TREE_LISTS == 1 + DISTANCE_BINS + MAX_CASCADES);

@@ -1,7 +1,8 @@
 //! Local density of a species; twin of `shaders/forest/density.glsl`.
 
+use crate::physics::raster::Raster;
 use crate::physics::terrain::height_and_slope;
-use crate::scene::{Distribution, Raster, Terrain};
+use crate::scene::{Distribution, Terrain};
 
 /// Width of smooth height limits, as a part of the range between them.
 pub const HEIGHT_SOFTNESS: f32 = 0.1;

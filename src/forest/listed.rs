@@ -4,7 +4,8 @@
 //! centres around it. Interpolated bilinearly again, as a density map is, that is a piecewise cubic kernel three to four
 //! cells wide: about a hundred trees, so that the density is good to a tenth wherever it is near its mean.
 
-use crate::scene::{Raster, TreePosition};
+use crate::physics::raster::Raster;
+use crate::scene::TreePosition;
 
 /// Mean number of trees a cell.
 const TREES_A_CELL: f64 = 16.0;

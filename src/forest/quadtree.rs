@@ -5,7 +5,8 @@
 //! distance is below refine s plus the quad's diagonal, 1.9 s on slopes up to 40°), and from there on a coarser one may
 //! (its box is at least 2 refine s away). So shared vertices are equal in both, and levels change only where both agree.
 
-use crate::scene::{Raster, Terrain};
+use crate::physics::raster::Raster;
+use crate::scene::Terrain;
 
 /// Smallest `refine` for which the morph range above is not empty, with room to spare.
 pub const MIN_REFINE: f64 = 3.5;
@@ -306,7 +307,7 @@ mod tests {
             for i in 0..=4 {
                 for j in 0..=4 {
                     let (x, y) = (low[0] + 97.0 * f64::from(i) / 4.0, low[1] + 143.0 * f64::from(j) / 4.0);
-                    let z = crate::physics::terrain::height_at(&terrain, x, y);
+                    let z = terrain.height_at(x, y);
                     assert!((b.low[2]..=b.high[2]).contains(&z), "{z} {b:?}");
                 }
             }
@@ -325,7 +326,7 @@ mod tests {
                 let [u, v] = [k % 9, k / 9].map(|c| f64::from(c) / 8.0);
                 let x = ((f64::from(quad.x) + u) * side).min(tree.extent[0]);
                 let y = ((f64::from(quad.y) + v) * side).min(tree.extent[1]);
-                let z = crate::physics::terrain::height_at(&terrain, x, y);
+                let z = terrain.height_at(x, y);
                 let away = ((x - eye[0]).powi(2) + (y - eye[1]).powi(2) + (z - eye[2]).powi(2)).sqrt();
                 assert!(said <= away + 1e-9, "{quad:?}: {said} {away}");
             }

@@ -7,8 +7,9 @@ use std::f64::consts::{PI, TAU};
 
 use crate::frame::camera::{Eye, add};
 use crate::gpu::interface::{Seed, SeedQuad, View};
+use crate::physics::raster::Raster;
 use crate::plan::Plan;
-use crate::scene::{Raster, Terrain};
+use crate::scene::Terrain;
 
 /// Distances from a tree at which its sight line is compared with the ground, each twice the one before.
 const STEPS: u32 = 7;

@@ -4,14 +4,16 @@ use std::borrow::Cow;
 
 use super::density::{HEIGHT_SOFTNESS, SLOPE_SOFTNESS};
 use super::listed;
-use crate::bake::{Baked, ZField, tables};
+use crate::bake::{Baked, tables};
 use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
 use crate::physics::masks::combination_table;
+use crate::physics::raster::Raster;
 use crate::physics::transfer::NEUTRAL;
 use crate::physics::views;
+use crate::physics::zfield::ZField;
 use crate::plan::Plan;
-use crate::scene::{Distribution, Raster, Scene, Species, TreePosition};
+use crate::scene::{Distribution, Scene, Species, TreePosition};
 use crate::{Error, Result};
 
 /// Everything about species that shaders read.

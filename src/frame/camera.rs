@@ -1,6 +1,5 @@
 //! The eye: a camera at a resolution, in doubles.
 
-use crate::physics::terrain::height_at;
 use crate::scene::{Camera, Terrain};
 
 /// Near plane, m.
@@ -46,7 +45,7 @@ pub(crate) fn add(a: [f64; 3], b: [f64; 3], s: f64) -> [f64; 3] {
 impl Eye {
     /// Places a scene's camera; its heights are above the ground there.
     pub fn new(camera: &Camera, terrain: &Terrain, size: [u32; 2]) -> Self {
-        let place = |p: [f64; 3]| [p[0], p[1], p[2] + height_at(terrain, p[0], p[1])];
+        let place = |p: [f64; 3]| [p[0], p[1], p[2] + terrain.height_at(p[0], p[1])];
         let (position, target) = (place(camera.position), place(camera.target));
         Eye::looking(position, add(target, position, -1.0), camera.vertical_fov, size)
     }

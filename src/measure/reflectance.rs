@@ -16,9 +16,10 @@ use crate::frame::Renderer;
 use crate::frame::camera::Eye;
 use crate::frame::cascades::Cascade;
 use crate::gpu::Gpu;
+use crate::physics::raster::Raster;
 use crate::plan::{Plan, Representation};
 use crate::reference::{Options, World};
-use crate::scene::{Camera, Distribution, Raster, Scene, Terrain};
+use crate::scene::{Camera, Distribution, Scene, Terrain};
 use crate::{Error, Result};
 
 /// Distance of the camera from a patch, in sides of the patch: rays diverge by 1.2 degrees.
@@ -287,7 +288,7 @@ fn shown(view: [f64; 2], slope: f64, side: f64) -> f64 {
 /// The viewer of a patch.
 fn eye(terrain: &Terrain, view: [f64; 2], centre: [f64; 2], away: f64, m: &Method, pixels_at_1m: f64) -> Eye {
     let v = direction(view);
-    let ground = crate::physics::terrain::height_at(terrain, centre[0], centre[1]);
+    let ground = terrain.height_at(centre[0], centre[1]);
     let target = [centre[0], centre[1], ground];
     let position = std::array::from_fn(|k| target[k] + away * v[k]);
     let fov = 2.0 * (0.5 * m.side / away).atan().to_degrees();

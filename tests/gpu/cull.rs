@@ -8,8 +8,9 @@ use canopy::gpu::Gpu;
 use canopy::gpu::interface::{
     CAMERA_DRAWS, CULL_GROUP, DISTANCE_BINS, DrawCommand, MAX_CASCADES, TREE_LISTS, Tree, View,
 };
+use canopy::physics::raster::Raster;
 use canopy::plan::Plan;
-use canopy::scene::{Camera, Distribution, Raster, Scene, TreePosition};
+use canopy::scene::{Camera, Distribution, Scene, TreePosition};
 use std::sync::Arc;
 
 /// Hills of 900 m with a dense species and a listed one.

@@ -4,7 +4,8 @@ use crate::device::{self, Worst};
 use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::image::Linear;
-use canopy::scene::{Camera, Distribution, Raster, Scene, Sky, TreePosition};
+use canopy::physics::raster::Raster;
+use canopy::scene::{Camera, Distribution, Scene, Sky, TreePosition};
 use std::f64::consts::PI;
 use std::sync::Arc;
 

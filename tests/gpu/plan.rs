@@ -8,8 +8,9 @@ use canopy::frame::Renderer;
 use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::image::{Linear, Picture};
+use canopy::physics::raster::Raster;
 use canopy::plan::{Plan, Representation};
-use canopy::scene::{Camera, Distribution, Raster, Scene};
+use canopy::scene::{Camera, Distribution, Scene};
 
 const SIZE: [u32; 2] = [64, 48];
 
@@ -190,7 +191,7 @@ fn a_listed_forest_needs_no_pattern_and_a_plain_no_height_map() {
     assert!(!listed.has("point pattern") && listed.draws("seeds"));
     assert!(listed.has("density maps"), "how densely listed trees stand");
     let (width, height) = (11, 11);
-    scene.terrain.heights = Some(canopy::scene::Raster { width, height, samples: vec![1.0; 121] });
+    scene.terrain.heights = Some(canopy::physics::raster::Raster { width, height, samples: vec![1.0; 121] });
     scene.terrain.cell_size = 30.0;
     assert!(draw(&gpu, &scene).has("height map"));
     gpu.close().unwrap();

@@ -140,7 +140,7 @@ fn pictures(b: &Bench) {
             }
             let (t, a) = (f64::to_radians(view[0]), f64::to_radians(view[1]));
             let v = [t.sin() * a.sin(), -t.sin() * a.cos(), t.cos()];
-            let ground = canopy::physics::terrain::height_at(&scene.terrain, 1200.0, 1200.0);
+            let ground = scene.terrain.height_at(1200.0, 1200.0);
             let distance = 180.0 * if zoom > 1.0 { 5.0 } else { 1.0 };
             let position = [1200.0 + distance * v[0], 1200.0 + distance * v[1], ground + distance * v[2]];
             // Far is the same patch of ground in pixels that are as many times larger.

@@ -127,7 +127,7 @@ pub struct FieldAim {
 /// Light transfer of all views, on one level.
 struct TransferLevel {
     size: usize,
-    /// By band, as in [`crate::bake::Transfer`].
+    /// By band, as in [`crate::physics::transfer::Transfer`].
     bands: Vec<Vec<u8>>,
 }
 
