@@ -30,8 +30,8 @@
 //!
 //! | paper | module | shader | test |
 //! |---|---|---|---|
-//! | BN12 §3, terrain quadtree | [`forest::terrain`], [`forest::quadtree`], [`physics::terrain`] | `forest/terrain_tile.comp`, `physics/terrain.glsl` | `tests/gpu/ground.rs` |
-//! | BN12 §4, seeds from densities | [`forest::seeds`], [`forest::candidate`], [`forest::pattern`], [`forest::listed`] | `forest/seeds.comp`, `forest/candidate.glsl`, `forest/density.glsl` | `tests/gpu/seeds.rs` |
+//! | BN12 §3, terrain quadtree | [`forest::terrain`], [`land::quadtree`], [`physics::terrain`] | `forest/terrain_tile.comp`, `physics/terrain.glsl` | `tests/gpu/ground.rs` |
+//! | BN12 §4, seeds from densities | [`forest::seeds`], [`land::candidate`], [`land::pattern`], [`land::listed`] | `forest/seeds.comp`, `land/candidate.glsl`, `land/density.glsl` | `tests/gpu/seeds.rs` |
 //! | BN12 §4, coverage | [`forest::coverage`] | `forest/coverage*`, `frame/cover.glsl` | `tests/gpu/coverage.rs` |
 //! | BN12 §5, views of a z-field | [`bake`], [`physics::views`] | `physics/views.glsl` | `tests/views.rs`, `tests/bake.rs`, `tests/gpu/views.rs` |
 //! | BN12 §5, surface along a ray | [`physics::zfield`] | `physics/zfield.glsl` | `tests/zfield.rs`, `tests/zfield_quality.rs`, `tests/gpu/zfield.rs` |
@@ -43,7 +43,7 @@
 //! | BN12 §7, eq. 22–27, hand-over | [`physics::handover`] | `physics/handover.glsl` | `tests/gpu/tables.rs`, `tests/proofs/` |
 //! | BN12 §9, figures 7 and 8 | [`measure::reflectance`] | | `tests/proofs/scale.rs`, `tests/cli.rs` |
 //! | BN12 §8, culling in order | [`forest::cull`] | `forest/cull.comp`, `forest/scan.comp`, `forest/compact.comp` | `tests/gpu/cull.rs` |
-//! | BN12 §7, trees on silhouettes beyond the hand-over | [`forest::silhouette`] | `forest/silhouette.glsl` | `tests/gpu/silhouettes.rs` |
+//! | BN12 §7, trees on silhouettes beyond the hand-over | [`land::silhouette`] | `land/silhouette.glsl` | `tests/gpu/silhouettes.rs` |
 //! | BN12 §8, sub-pixel masks | [`physics::masks`] | `physics/masks.glsl` | `measure/conform/law.rs`, `tests/conform.rs` |
 //! | Monte-Carlo reference (Kajiya 1986), error of every pixel | [`mod@reference`] | | `tests/reference.rs` |
 //! | parallel-split shadow maps (Zhang et al. 2006) | [`frame::cascades`], [`frame::shadows`] | `frame/tree_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
@@ -76,6 +76,7 @@ pub mod forest;
 pub mod frame;
 pub mod gpu;
 pub mod image;
+pub mod land;
 pub mod measure;
 pub mod physics;
 pub mod plan;

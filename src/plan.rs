@@ -1,15 +1,15 @@
 //! What a scene requires: every table, view set, cache, target and pass, with the reason and the bytes, before anything
 //! is allocated. What no one needs is not in the plan, and is not built.
 
-use crate::forest::candidate::{Layout, POINTS};
-use crate::forest::pattern::Pattern;
-use crate::forest::quadtree::{MIN_REFINE, quad_count};
-use crate::forest::seeds::fullest_listed;
-use crate::forest::species::density_map_size;
 use crate::frame::camera::Eye;
 use crate::frame::shader_map;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
+use crate::land::candidate::{Layout, POINTS};
+use crate::land::density::density_map_size;
+use crate::land::listed::fullest_listed;
+use crate::land::pattern::Pattern;
+use crate::land::quadtree::{MIN_REFINE, quad_count};
 use crate::physics::raster::Raster;
 use crate::physics::views;
 use crate::scene::{Albedo, Camera, Distribution, Scene, Sky};

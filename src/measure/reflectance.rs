@@ -101,7 +101,7 @@ pub fn mean_densities(scene: &Scene) -> Vec<f64> {
                 let sum: f64 = (0..(n * n) as usize)
                     .map(|k| {
                         let (x, y) = (at(k % n as usize, width), at(k / n as usize, height));
-                        crate::forest::density::local(&s.distribution, &scene.terrain, x, y)
+                        crate::land::density::local(&s.distribution, &scene.terrain, x, y)
                     })
                     .sum();
                 sum / f64::from(n * n)

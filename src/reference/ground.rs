@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 
 use glam::{DVec2, DVec3};
 
-use crate::forest::quadtree::Quadtree;
+use crate::land::quadtree::Quadtree;
 use crate::physics::raster::Raster;
 use crate::physics::terrain::height_and_slope;
 use crate::physics::tonemap::linear;

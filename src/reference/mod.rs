@@ -35,7 +35,7 @@
 //!
 //! # Where trees come from
 //!
-//! From [`crate::forest::candidate`], the twin of the shader that makes the renderer's seeds: the same places, species,
+//! From [`crate::land::candidate`], the twin of the shader that makes the renderer's seeds: the same places, species,
 //! rotations, scales and tints. At distances where the renderer draws a shader-map the reference still has the trees. Only
 //! those are made that the eye may see, or that shade or light what it sees: trees within six heights of the tallest, and
 //! those whose shadows reach it.

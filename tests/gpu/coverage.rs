@@ -2,10 +2,10 @@
 
 use crate::device::{self, Worst};
 use crate::seeds::{SIZE, above, hills, plain, positions, seeds};
-use canopy::forest::quadtree::{MIN_REFINE, QuadKey, Quadtree};
 use canopy::frame::{FrameReport, Renderer};
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::{COVER_GUTTER, Seed, TERRAIN_CELLS, TerrainQuad};
+use canopy::land::quadtree::{MIN_REFINE, QuadKey, Quadtree};
 use canopy::physics::raster::Raster;
 use canopy::plan::Plan;
 use canopy::scene::{Camera, Distribution, Scene, TreePosition};

@@ -1,11 +1,11 @@
 //! Seeds as the device produces them: where, how many, always the same.
 
 use crate::device::{self, Worst};
-use canopy::forest::candidate::{Layout, listed};
 use canopy::frame::Renderer;
 use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::{DrawCommand, Seed};
+use canopy::land::candidate::{Layout, listed};
 use canopy::physics::hash::{hash, unit};
 use canopy::physics::raster::Raster;
 use canopy::physics::terrain::height_and_slope;

@@ -4,11 +4,11 @@ use std::collections::HashMap;
 
 use crate::device;
 use canopy::forest::cull::{CLASS_CAMERA, classify, tree_centre};
-use canopy::forest::silhouette::clearance;
 use canopy::frame::Renderer;
 use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::{DrawCommand, Seed, SeedQuad, Tree, View};
+use canopy::land::silhouette::clearance;
 use canopy::physics::raster::Raster;
 use canopy::plan::Plan;
 use canopy::scene::{Camera, Distribution, Scene};

@@ -1,8 +1,11 @@
-//! Local density of a species; twin of `shaders/forest/density.glsl`.
+//! Density of a species: at a place (twin of `shaders/land/density.glsl`), and the map of it over the terrain.
 
+use std::borrow::Cow;
+
+use super::listed;
 use crate::physics::raster::Raster;
 use crate::physics::terrain::height_and_slope;
-use crate::scene::{Distribution, Terrain};
+use crate::scene::{Distribution, Species, Terrain};
 
 /// Width of smooth height limits, as a part of the range between them.
 pub const HEIGHT_SOFTNESS: f32 = 0.1;
@@ -33,6 +36,35 @@ pub fn local(distribution: &Distribution, terrain: &Terrain, x: f64, y: f64) -> 
         density *= 1.0 - smoothstep(t - soft, t + soft, slope);
     }
     density
+}
+
+/// A density over the whole terrain.
+pub struct DensityMap<'a> {
+    /// Relative to its largest value.
+    pub relative: Cow<'a, Raster>,
+    /// Listed trees per m² where it is 1.
+    pub listed: f64,
+}
+
+/// The map of a species' density, or of its listed trees; `None`: the same everywhere.
+pub fn density_map(species: &Species, extent: [f64; 2]) -> Option<DensityMap<'_>> {
+    match &species.distribution {
+        Distribution::Density { map, .. } => {
+            map.as_deref().map(|m| DensityMap { relative: Cow::Borrowed(m), listed: 0.0 })
+        }
+        Distribution::Positions(list) => {
+            let (relative, listed) = listed::density(extent, list);
+            Some(DensityMap { relative: Cow::Owned(relative), listed })
+        }
+    }
+}
+
+/// Texels of the map that a species' density needs.
+pub fn density_map_size(species: &Species, extent: [f64; 2]) -> Option<[u32; 2]> {
+    match &species.distribution {
+        Distribution::Density { map, .. } => map.as_ref().map(|m| [m.width, m.height]),
+        Distribution::Positions(list) => Some(listed::grid_size(extent, list.len())),
+    }
 }
 
 fn smoothstep(low: f64, high: f64, x: f64) -> f64 {

@@ -1,11 +1,15 @@
-//! The density of listed trees (BN12, section 4: "the converse is also possible"): how many stand around a place.
+//! Listed trees: which stand in which quad, and their density (BN12, section 4: "the converse is also possible"), that is how
+//! many stand around a place.
 //!
 //! Trees are counted on a grid of cells that hold sixteen on average, each shared bilinearly between the four cell
 //! centres around it. Interpolated bilinearly again, as a density map is, that is a piecewise cubic kernel three to four
 //! cells wide: about a hundred trees, so that the density is good to a tenth wherever it is near its mean.
 
+use std::collections::HashMap;
+
+use crate::gpu::interface::ListedTree;
 use crate::physics::raster::Raster;
-use crate::scene::TreePosition;
+use crate::scene::{Distribution, Scene, TreePosition};
 
 /// Mean number of trees a cell.
 const TREES_A_CELL: f64 = 16.0;
@@ -37,6 +41,43 @@ pub fn density(extent: [f64; 2], trees: &[TreePosition]) -> (Raster, f64) {
     let relative = |count: &f64| if most > 0.0 { (count / most) as f32 } else { 0.0 };
     let samples = counts.iter().map(relative).collect();
     (Raster { width, height, samples }, most / (cell[0] * cell[1]))
+}
+
+/// First and number of the listed trees of a quad.
+pub type ListedRanges = HashMap<(i32, i32), (u32, u32)>;
+
+/// Listed trees quad by quad, in the order of species and lists, and each quad's first and number.
+pub fn bin_listed(scene: &Scene, side: f64) -> (Vec<ListedTree>, ListedRanges) {
+    let mut all: Vec<((i32, i32), ListedTree)> = Vec::new();
+    for (species, s) in scene.species.iter().enumerate() {
+        let Distribution::Positions(list) = &s.distribution else { continue };
+        for (index, p) in list.iter().enumerate() {
+            // A tree on the far border belongs to the last quad.
+            let quad = [0, 1].map(|k| {
+                let last = (scene.terrain.extent[k] / side).ceil().max(1.0) - 1.0;
+                ([p.x, p.y][k] / side).floor().clamp(0.0, last)
+            });
+            let tree = ListedTree {
+                position: [(p.x - quad[0] * side) as f32, (p.y - quad[1] * side) as f32],
+                scale: p.scale.unwrap_or(0.0),
+                turn: p.rotation.map_or(-1.0, |r| (r / 360.0).rem_euclid(1.0)),
+                species: species as u32,
+                index: index as u32,
+            };
+            all.push(((quad[1] as i32, quad[0] as i32), tree));
+        }
+    }
+    all.sort_by_key(|(quad, _)| *quad);
+    let mut ranges: HashMap<(i32, i32), (u32, u32)> = HashMap::new();
+    for (k, ((y, x), _)) in all.iter().enumerate() {
+        ranges.entry((*x, *y)).or_insert((k as u32, 0)).1 += 1;
+    }
+    (all.into_iter().map(|(_, t)| t).collect(), ranges)
+}
+
+/// Trees of the fullest quad of listed trees.
+pub fn fullest_listed(scene: &Scene, side: f64) -> u32 {
+    bin_listed(scene, side).1.values().map(|(_, n)| *n).max().unwrap_or(0)
 }
 
 #[cfg(test)]

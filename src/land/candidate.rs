@@ -1,4 +1,4 @@
-//! The trees of a seed quad on the CPU; twin of `shaders/forest/candidate.glsl`: points of the quad's Wang tiles thinned to
+//! The trees of a seed quad on the CPU; twin of `shaders/land/candidate.glsl`: points of the quad's Wang tiles thinned to
 //! the local density, then its listed trees.
 //!
 //! Identities, species, scales, rotations and tints are the shader's to the bit but where a hash falls within rounding of

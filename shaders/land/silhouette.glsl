@@ -1,6 +1,6 @@
 // Which trees beyond the hand-over stay, because they stand out from the ground. The shader-map on the terrain that takes
 // over has no thickness: ridges against the sky or against far ground would lose their trees. Twin, to the bit:
-// src/forest/silhouette.rs. So everything is `precise`, in a fixed order, and without divisions or square roots, which
+// src/land/silhouette.rs. So everything is `precise`, in a fixed order, and without divisions or square roots, which
 // devices round differently.
 
 const uint SILHOUETTE_STEPS = 7u;

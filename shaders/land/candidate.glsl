@@ -1,7 +1,7 @@
 // The trees of a seed quad: points of its Wang tiles, thinned to the local density, then its listed trees. Whoever
 // includes this gets the same trees, to the bit: seeds are drawn one by one, coverage tiles show their discs.
 // Needs the parameters `p`, and `pattern`, `listed`, `species`, `scene_size`, `heights` and `densities` to be declared
-// before, and physics/hash.glsl, physics/terrain.glsl and forest/density.glsl.
+// before, and physics/hash.glsl, physics/terrain.glsl and land/density.glsl.
 
 uint edge_colour(ivec2 edge, uint axis) { return hash2(p.seed + axis, hash2(uint(edge.x), uint(edge.y))) & 1u; }
 

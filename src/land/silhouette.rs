@@ -8,7 +8,6 @@ use std::f64::consts::{PI, TAU};
 use crate::frame::camera::{Eye, add};
 use crate::gpu::interface::{Seed, SeedQuad, View};
 use crate::physics::raster::Raster;
-use crate::plan::Plan;
 use crate::scene::Terrain;
 
 /// Distances from a tree at which its sight line is compared with the ground, each twice the one before.
@@ -49,7 +48,7 @@ fn ground_height(heights: &Raster, position: [f32; 2], cell: f32) -> f32 {
 }
 
 /// How far sight lines to a tree pass above the ground, m, at most half its height; twin of `silhouette` in
-/// `shaders/forest/silhouette.glsl`, where it is explained, to the bit. The tree stays where it is above 0.
+/// `shaders/land/silhouette.glsl`, where it is explained, to the bit. The tree stays where it is above 0.
 pub fn clearance(
     view: &View,
     quad: &SeedQuad,
@@ -108,22 +107,35 @@ impl Ground<'_> {
     }
 }
 
-/// Seed quads whose trees may stand on a silhouette: beyond the plan's range, up to that of silhouettes.
+/// Where trees on silhouettes are looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Belt {
+    /// Distance to which all trees are drawn, m.
+    pub from: f64,
+    /// Distance to which those on silhouettes are, m.
+    pub to: f64,
+    /// Side of a seed quad, m.
+    pub quad_side: f64,
+    /// Height of the tallest tree, m.
+    pub tallest: f64,
+}
+
+/// Seed quads whose trees may stand on a silhouette in a belt around the eye.
 ///
 /// Vertical sections through the eye, one every few cells of the height map: along each, [`clearance`] is estimated from
 /// the heights in the section, to the tree's favour, and what the terrain before it hides is left out. Trees are as tall as
-/// the plan's tallest, or half of that.
-pub fn silhouette_quads(ground: &Ground, eye: &Eye, plan: &Plan) -> BTreeSet<(i32, i32)> {
+/// the tallest, or half of that.
+pub fn silhouette_quads(ground: &Ground, eye: &Eye, belt: &Belt) -> BTreeSet<(i32, i32)> {
     let extent = ground.terrain.extent;
     let farthest = [0, 1].map(|k| eye.position[k].abs().max((eye.position[k] - extent[k]).abs()));
     let seen = farthest[0].hypot(farthest[1]).min(view_distance(eye, ground.lowest));
-    let to = plan.last_range().min(seen);
-    let from = plan.range - 2.0 * plan.quad_side;
+    let to = belt.to.min(seen);
+    let from = belt.from - 2.0 * belt.quad_side;
     let mut found = BTreeSet::new();
     if from >= to {
         return found;
     }
-    let spacing = ground.terrain.cell_size.max(plan.quad_side / 8.0).max(to / MOST_LINES);
+    let spacing = ground.terrain.cell_size.max(belt.quad_side / 8.0).max(to / MOST_LINES);
     let (first, width) = azimuths(eye);
     let lines = (width * to / spacing).ceil().clamp(1.0, MOST_LINES);
     for line in 0..lines as u32 {
@@ -132,16 +144,16 @@ pub fn silhouette_quads(ground: &Ground, eye: &Eye, plan: &Plan) -> BTreeSet<(i3
         section(
             |d| ground.height(place(d)),
             eye.position[2],
-            plan.tallest,
+            belt.tallest,
             spacing,
             [from, to],
             |d| {
                 let at = place(d);
                 for (i, j) in [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)] {
                     let quad = [at[0] + i * spacing, at[1] + j * spacing]
-                        .map(|v| v / plan.quad_side)
+                        .map(|v| v / belt.quad_side)
                         .map(|v| v.floor());
-                    let last = extent.map(|e| (e / plan.quad_side).ceil().max(1.0) - 1.0);
+                    let last = extent.map(|e| (e / belt.quad_side).ceil().max(1.0) - 1.0);
                     if (0..2).all(|k| quad[k] >= 0.0 && quad[k] <= last[k]) {
                         found.insert((quad[0] as i32, quad[1] as i32));
                     }
