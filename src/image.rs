@@ -9,8 +9,8 @@ use exr::prelude::{
 };
 use half::f16;
 
+use crate::camera::NEAR_PLANE;
 use crate::files::write_whole;
-use crate::frame::camera::NEAR_PLANE;
 use crate::frame::targets::ImageTargets;
 use crate::gpu::Gpu;
 use crate::plan::Plan;

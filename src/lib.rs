@@ -14,7 +14,7 @@
 //! let baked = canopy::bake::load_or_bake_scene(&scene, cache.as_deref(), false)?;
 //! let baked: Vec<_> = baked.into_iter().map(|(species, _)| species).collect();
 //! let mut renderer = canopy::frame::Renderer::new(&gpu, scene.clone(), plan, &baked)?;
-//! renderer.render(&camera, canopy::frame::auto_exposure(&scene))?;
+//! renderer.render(&camera, canopy::camera::auto_exposure(&scene))?;
 //! renderer.picture()?.write_png("ridge.png".as_ref())?;
 //! drop(renderer);
 //! gpu.close() // Reports what the validation layers said, and what is still allocated.
@@ -46,7 +46,7 @@
 //! | BN12 §7, trees on silhouettes beyond the hand-over | [`land::silhouette`] | `land/silhouette.glsl` | `tests/gpu/silhouettes.rs` |
 //! | BN12 §8, sub-pixel masks | [`physics::masks`] | `physics/masks.glsl` | `measure/conform/law.rs`, `tests/conform.rs` |
 //! | Monte-Carlo reference (Kajiya 1986), error of every pixel | [`mod@reference`] | | `tests/reference.rs` |
-//! | parallel-split shadow maps (Zhang et al. 2006) | [`frame::cascades`], [`frame::shadows`] | `frame/tree_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
+//! | parallel-split shadow maps (Zhang et al. 2006) | [`camera::cascades`], [`frame::shadows`] | `frame/tree_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
 //! | trees that need no file (Weber and Penn 1995) | [`tree`] | | `tests/trees.rs` |
 //! | the scene file | [`scene`] | | `tests/scene_inputs.rs`, `tests/model_inputs.rs` |
 //! | conformance of a driver | [`measure::conform`] | `probe/*` | `tests/conform.rs`, `tests/conformance/`, `tests/proofs/planted.rs` |
@@ -69,6 +69,7 @@
 #![warn(missing_docs)]
 
 pub mod bake;
+pub mod camera;
 pub mod clock;
 pub mod error;
 pub mod files;

@@ -1,7 +1,7 @@
 //! What a scene requires: every table, view set, cache, target and pass, with the reason and the bytes, before anything
 //! is allocated. What no one needs is not in the plan, and is not built.
 
-use crate::frame::camera::Eye;
+use crate::camera::Eye;
 use crate::frame::shader_map;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use canopy::frame::camera::Eye;
+use canopy::camera::Eye;
 use canopy::physics::hash::Stream;
 use canopy::physics::raster::Raster;
 use canopy::reference::{Estimate, Light, Options, Until, World};

@@ -3,7 +3,7 @@
 use super::cache::SlotCache;
 use super::species::SpeciesData;
 use super::terrain::TerrainData;
-use crate::frame::camera::Eye;
+use crate::camera::Eye;
 use crate::gpu::interface::{DrawCommand, Seed, SeedParameters, SeedQuad};
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
 use crate::land::density::density_map_size;

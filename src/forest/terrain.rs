@@ -1,8 +1,7 @@
 //! Terrain tiles: heights and slopes of quads in texture arrays, least recently used first out.
 
 use super::cache::SlotCache;
-use crate::frame::camera::Eye;
-use crate::frame::cascades::Cascade;
+use crate::camera::{Cascade, Eye};
 use crate::gpu::interface::{
     NO_PAGE, TERRAIN_CELLS, TERRAIN_HEIGHTS, TERRAIN_SLOPES, TerrainParameters, TerrainQuad,
 };

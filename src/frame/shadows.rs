@@ -1,8 +1,7 @@
 //! All cascades in one layered pass: the terrain, then the trees' backs (BN12, section 5).
 
-use super::camera::Eye;
-use super::cascades::Cascade;
 use crate::Result;
+use crate::camera::{Cascade, Eye};
 use crate::forest::cull::CullData;
 use crate::forest::seeds::SeedData;
 use crate::forest::species::SpeciesData;
@@ -89,7 +88,14 @@ impl Shadows {
         let near = (0.02 * plan.shadow_distance).min(5.0).max(clear);
         let s = &scene.settings;
         let (count, split) = (plan.cascades, f64::from(s.cascade_split));
-        super::cascades::cascades(eye, sun, (clear, near, plan.shadow_distance), count, split, s.cascade_size)
+        crate::camera::cascades::cascades(
+            eye,
+            sun,
+            (clear, near, plan.shadow_distance),
+            count,
+            split,
+            s.cascade_size,
+        )
     }
 
     /// Records the pass.

@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 
-use crate::frame::camera::{Eye, add};
+use crate::camera::{Eye, add};
 use crate::gpu::interface::{Seed, SeedQuad, View};
 use crate::physics::raster::Raster;
 use crate::scene::Terrain;

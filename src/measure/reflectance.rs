@@ -12,9 +12,8 @@
 use std::sync::Arc;
 
 use crate::bake::Baked;
+use crate::camera::{Cascade, Eye};
 use crate::frame::Renderer;
-use crate::frame::camera::Eye;
-use crate::frame::cascades::Cascade;
 use crate::gpu::Gpu;
 use crate::physics::raster::Raster;
 use crate::plan::{Plan, Representation};
@@ -300,7 +299,7 @@ fn eye(terrain: &Terrain, view: [f64; 2], centre: [f64; 2], away: f64, m: &Metho
 fn shadow_texel(scene: &Scene, plan: &Plan, eye: &Eye, distance: f64) -> f64 {
     use crate::frame::shadows::Shadows;
     let cascades =
-        Shadows::cascades(scene, plan, eye, crate::frame::view::sun_direction(&scene.sun), eye.position[2]);
+        Shadows::cascades(scene, plan, eye, crate::camera::sun_direction(&scene.sun), eye.position[2]);
     cascades.iter().find(|c| distance <= c.far).or(cascades.last()).map_or(1.0, |c| c.texel)
 }
 
@@ -308,7 +307,7 @@ fn shadow_texel(scene: &Scene, plan: &Plan, eye: &Eye, distance: f64) -> f64 {
 fn cascade(scene: &Scene, eye: &Eye, away: f64, texel: f64) -> Cascade {
     let half = 0.5 * texel * f64::from(scene.settings.cascade_size);
     let target = std::array::from_fn(|k| away * eye.forward[k]);
-    Cascade::around(crate::frame::view::sun_direction(&scene.sun), eye, target, half, texel, 2.0 * away)
+    Cascade::around(crate::camera::sun_direction(&scene.sun), eye, target, half, texel, 2.0 * away)
 }
 
 /// Mean of an image: fractions, sun and sky part.

@@ -42,7 +42,7 @@
 //!
 //! ```no_run
 //! # fn main() -> canopy::Result<()> {
-//! use canopy::frame::camera::Eye;
+//! use canopy::camera::Eye;
 //! use canopy::reference::{Options, Until, World};
 //!
 //! let scene = canopy::scene::load("ridge.toml".as_ref())?;
@@ -50,7 +50,7 @@
 //! let world = World::new(&scene, &[eye])?;
 //! let options = Options { until: Until::Error(0.02), ..Options::default() };
 //! let estimate = world.render(&eye, &options, None, &mut |p| println!("{:.0} %", 100.0 * p.done))?;
-//! estimate.picture(canopy::frame::auto_exposure(&scene)).write_png("truth.png".as_ref())
+//! estimate.picture(canopy::camera::auto_exposure(&scene)).write_png("truth.png".as_ref())
 //! # }
 //! ```
 

@@ -11,7 +11,7 @@ use super::key::Key;
 use super::sampling::Random;
 use super::world::World;
 use super::{Options, Until};
-use crate::frame::camera::{Eye, NEAR_PLANE};
+use crate::camera::{Eye, NEAR_PLANE};
 use crate::{Error, Result};
 
 /// Pixels a piece of work.

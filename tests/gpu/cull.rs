@@ -1,9 +1,9 @@
 //! The culled set and its order, exactly those of the CPU.
 
 use crate::device;
+use canopy::camera::Eye;
 use canopy::forest::cull::{CLASS_CAMERA, CLASS_CASCADE, bin_end, classify, tree_centre};
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::{
     CAMERA_DRAWS, CULL_GROUP, DISTANCE_BINS, DrawCommand, MAX_CASCADES, TREE_LISTS, Tree, View,

@@ -1,7 +1,7 @@
 //! Ground, sky and shadows of whole frames, where the answer is known in closed form.
 
 use crate::device::{self, Worst};
-use canopy::frame::camera::Eye;
+use canopy::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::image::Linear;
 use canopy::physics::raster::Raster;

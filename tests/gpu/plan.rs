@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::device;
 use canopy::Error;
+use canopy::camera::Eye;
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::image::{Linear, Picture};
 use canopy::physics::raster::Raster;

@@ -1,8 +1,8 @@
 //! Seeds as the device produces them: where, how many, always the same.
 
 use crate::device::{self, Worst};
+use canopy::camera::Eye;
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::{DrawCommand, Seed};
 use canopy::land::candidate::{Layout, listed};

@@ -1,9 +1,8 @@
 //! Far forests in whole frames: fractions and radiances against the tables in f64, the hand-over, and extremes.
 
 use crate::device::{self, Worst};
+use canopy::camera::{Eye, sun_direction};
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
-use canopy::frame::view::sun_direction;
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::Species;
 use canopy::image::Linear;

@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 
 use crate::device;
+use canopy::camera::Eye;
 use canopy::forest::cull::{CLASS_CAMERA, classify, tree_centre};
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::{DrawCommand, Seed, SeedQuad, Tree, View};
 use canopy::land::silhouette::clearance;

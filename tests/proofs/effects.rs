@@ -1,7 +1,7 @@
 //! The six effects of BN12, figure 9, near and far, each as a number and a picture.
 
+use canopy::camera::Eye;
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
 use canopy::measure::reflectance::{Measured, Method, Request, measure, patch_scene};
 use canopy::plan::{Plan, Representation};
 use canopy::scene::{Scene, Sky};
@@ -146,7 +146,7 @@ fn pictures(b: &Bench) {
             // Far is the same patch of ground in pixels that are as many times larger.
             let mut eye = Eye::looking(position, v.map(|c| -c), 40.0, [480, 360]);
             eye.pixels_at_1m /= zoom;
-            let exposure = canopy::frame::auto_exposure(&scene);
+            let exposure = canopy::camera::auto_exposure(&scene);
             let plan = Plan::for_eye(&scene, &eye, false, Representation::Auto, Some(b.gpu.info())).unwrap();
             let mut renderer = Renderer::new(&b.gpu, std::sync::Arc::new(scene), plan, &b.baked).unwrap();
             renderer.render_eye(&eye, exposure).unwrap();

@@ -1,7 +1,7 @@
 //! Shadow cascades: parallel splits (Zhang et al. 2006), each a sphere around its slice of the frustum, moved in whole
 //! texels so that shadows do not swim as the camera moves or turns.
 
-use super::camera::{Eye, add, cross, dot, normalize};
+use super::{Eye, add, cross, dot, normalize};
 use crate::physics::shadow::parallel_splits;
 
 /// One cascade: an orthographic view from the sun.
