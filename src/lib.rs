@@ -82,6 +82,7 @@ pub mod measure;
 pub mod physics;
 pub mod plan;
 pub mod progress;
+pub mod rays;
 pub mod reference;
 pub mod scene;
 pub mod settings;

@@ -6,7 +6,6 @@ pub mod file;
 mod occlusion;
 pub(crate) mod optics;
 mod raster;
-pub(crate) mod rays;
 mod scene;
 mod self_shadow;
 pub(crate) mod surface;

@@ -332,7 +332,7 @@ impl Renderer {
     /// [`crate::Error::Device`] if the device fails.
     pub fn picture(&self) -> Result<Picture> {
         let _read = info_span!("read back").entered();
-        Picture::read(&self.gpu, &self.plan, &self.targets, self.light.scale)
+        self.targets.read(&self.gpu, &self.plan, self.light.scale)
     }
 
     /// The device that draws.

@@ -58,7 +58,6 @@ mod estimate;
 mod file;
 mod foliage;
 mod ground;
-mod hierarchy;
 mod key;
 mod path;
 mod render;

@@ -6,11 +6,11 @@ use glam::{DVec3, Vec3};
 
 use super::foliage::Foliage;
 use super::ground::Ground;
-use super::hierarchy::{Hierarchy, Stack};
 use super::key::Key;
 use super::trees::{self, Tree};
 use crate::Result;
 use crate::camera::{Eye, Light};
+use crate::rays::{Hierarchy, Stack};
 use crate::scene::{Scene, Sky};
 
 /// Rays leave a tree's surface at this part of the tree's size, against meeting it again.

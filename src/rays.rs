@@ -1,14 +1,18 @@
-//! Bounding-volume hierarchies four boxes wide, walked front to back.
+//! Rays against boxes and triangles: bounding-volume hierarchies four boxes wide, walked front to back. Bakes and the reference
+//! cast all their rays through them.
 //!
 //! The `bvh` crate builds them by the surface-area heuristic (two children a node, one shape a leaf). Its own iterators
 //! allocate, and visit either everything that a ray's box touches or one box after the other; so its tree is folded here:
 //! a node holds the boxes of up to four descendants, tested together, and subtrees of a few shapes are one leaf.
 
-use bvh::aabb::Aabb;
+mod triangles;
+
+use bvh::aabb::{Aabb, Bounded};
+use bvh::bounding_hierarchy::BHShape;
 use bvh::bvh::{Bvh, BvhNode};
 use glam::{Vec3, Vec4};
 
-use crate::bake::rays::Shape;
+pub use triangles::{Met, Triangles};
 
 /// Boxes of a node.
 const WIDTH: usize = 4;
@@ -16,6 +20,29 @@ const WIDTH: usize = 4;
 const LEAF: u32 = 1 << 31;
 /// A ray enters a box that it touches within the rounding of its three products and differences.
 const SLACK: f32 = 1.0 + 8.0 * f32::EPSILON;
+
+/// A box, and its place in the crate's tree.
+struct Shape {
+    low: Vec3,
+    high: Vec3,
+    node: usize,
+}
+
+impl Bounded<f32, 3> for Shape {
+    fn aabb(&self) -> Aabb<f32, 3> {
+        Aabb::with_bounds(self.low.to_array().into(), self.high.to_array().into())
+    }
+}
+
+impl BHShape<f32, 3> for Shape {
+    fn set_bh_node_index(&mut self, index: usize) {
+        self.node = index;
+    }
+
+    fn bh_node_index(&self) -> usize {
+        self.node
+    }
+}
 
 /// Two cache lines.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +71,7 @@ impl Hierarchy {
     /// Builds a hierarchy over (low, high) boxes. `leaf` takes the indices of up to `most` boxes and returns the number
     /// by which [`Hierarchy::walk`] names them.
     pub fn new(boxes: &[(Vec3, Vec3)], most: usize, mut leaf: impl FnMut(&[u32]) -> u32) -> Self {
-        let mut shapes: Vec<Shape> = boxes.iter().map(|&(low, high)| Shape::new(low, high)).collect();
+        let mut shapes: Vec<Shape> = boxes.iter().map(|&(low, high)| Shape { low, high, node: 0 }).collect();
         // Sequential: the order of nodes is then the same every time.
         let tree = if shapes.is_empty() { Vec::new() } else { Bvh::build(&mut shapes).nodes };
         drop(shapes);
