@@ -35,18 +35,18 @@
 //! | BN12 §4, coverage | [`forest::coverage`] | `forest/coverage*`, `frame/cover.glsl` | `tests/gpu/coverage.rs` |
 //! | BN12 §5, views of a z-field | [`bake`], [`physics::views`] | `physics/views.glsl` | `tests/views.rs`, `tests/bake.rs`, `tests/gpu/views.rs` |
 //! | BN12 §5, surface along a ray | [`physics::zfield`] | `physics/zfield.glsl` | `tests/zfield.rs`, `tests/zfield_quality.rs`, `tests/gpu/zfield.rs` |
-//! | BN12 eq. 7–12, light | [`physics::light`] | `physics/light.glsl`, `frame/tree_shade.glsl`, `frame/ground.glsl` | `tests/gpu/light.rs`, `tests/gpu/light_on_ground.rs` |
-//! | self-shadow and leaf angles, measured instead of BN12 eq. 7 and 8 | [`bake`], [`physics::light::self_shadow`] | `physics/light.glsl`, `frame/tree_shade.glsl` | `tests/bake.rs`, `tests/gpu/light.rs` |
-//! | light transfer (Sloan et al. 2002) of z-field texels | [`bake`], [`physics::transfer`] | `physics/transfer.glsl`, `frame/tree_shade.glsl` | `tests/bake.rs`, `tests/gpu/transfer.rs` |
+//! | BN12 eq. 7–12, light | [`physics::light`] | `physics/light.glsl`, `frame/trees/zfield_shade.glsl`, `frame/ground.glsl` | `tests/gpu/light.rs`, `tests/gpu/light_on_ground.rs` |
+//! | self-shadow and leaf angles, measured instead of BN12 eq. 7 and 8 | [`bake`], [`physics::light::self_shadow`] | `physics/light.glsl`, `frame/trees/zfield_shade.glsl` | `tests/bake.rs`, `tests/gpu/light.rs` |
+//! | light transfer (Sloan et al. 2002) of z-field texels | [`bake`], [`physics::transfer`] | `physics/transfer.glsl`, `frame/trees/zfield_shade.glsl` | `tests/bake.rs`, `tests/gpu/transfer.rs` |
 //! | BN12 §6, tables G, T, D, E of far forests | [`bake::tables`], [`forest::tables`], [`physics::tables`] | `physics/tables.glsl` | `tests/tables.rs`, `tests/gpu/tables.rs` |
-//! | BN12 §6, eq. 13–21, shader-map | [`frame::shader_map`] | `frame/shader_map.*`, `frame/ground.glsl` | `tests/gpu/shader_map.rs` |
+//! | BN12 §6, eq. 13–21, shader-map | [`frame::trees::shader_map`] | `frame/trees/shader_map.*`, `frame/ground.glsl` | `tests/gpu/shader_map.rs` |
 //! | BN12 §7, eq. 22–27, hand-over | [`physics::handover`] | `physics/handover.glsl` | `tests/gpu/tables.rs`, `tests/proofs/` |
 //! | BN12 §9, figures 7 and 8 | [`measure::reflectance`] | | `tests/proofs/scale.rs`, `tests/cli.rs` |
 //! | BN12 §8, culling in order | [`forest::cull`] | `forest/cull.comp`, `forest/scan.comp`, `forest/compact.comp` | `tests/gpu/cull.rs` |
 //! | BN12 §7, trees on silhouettes beyond the hand-over | [`land::silhouette`] | `land/silhouette.glsl` | `tests/gpu/silhouettes.rs` |
 //! | BN12 §8, sub-pixel masks | [`physics::masks`] | `physics/masks.glsl` | `measure/conform/law.rs`, `tests/conform.rs` |
 //! | Monte-Carlo reference (Kajiya 1986), error of every pixel | [`mod@reference`] | | `tests/reference.rs` |
-//! | parallel-split shadow maps (Zhang et al. 2006) | [`camera::cascades`], [`frame::shadows`] | `frame/tree_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
+//! | parallel-split shadow maps (Zhang et al. 2006) | [`camera::cascades`], [`frame::shadows`] | `frame/trees/zfield_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
 //! | trees that need no file (Weber and Penn 1995) | [`tree`] | | `tests/trees.rs` |
 //! | the scene file | [`scene`] | | `tests/scene_inputs.rs`, `tests/model_inputs.rs` |
 //! | conformance of a driver | [`measure::conform`] | `probe/*` | `tests/conform.rs`, `tests/conformance/`, `tests/proofs/planted.rs` |

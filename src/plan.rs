@@ -2,7 +2,6 @@
 //! is allocated. What no one needs is not in the plan, and is not built.
 
 use crate::camera::Eye;
-use crate::frame::shader_map;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
 use crate::land::candidate::{Layout, POINTS};
@@ -318,6 +317,12 @@ impl Plan {
         self.cover_channels.div_ceil(4)
     }
 
+    /// Bytes of the shader-map's nodes.
+    pub fn node_bytes(&self) -> u64 {
+        let nodes = u64::from(self.terrain_tiles) * u64::from(gpu::FOREST_NODES * gpu::FOREST_NODES);
+        nodes * size_of::<gpu::ForestNode>() as u64
+    }
+
     /// Whether any tree on ground of this extent between two heights may be near enough to a place to be drawn by itself:
     /// whether the box of their centres reaches into the range, with room for the rounding of single precision.
     pub fn trees_in_range(&self, extent: [f64; 2], [lowest, highest]: [f64; 2], place: [f64; 3]) -> bool {
@@ -567,7 +572,7 @@ impl Plan {
                 "target",
                 "shader-map nodes",
                 format!("trees far away on {} quads of terrain", self.terrain_tiles),
-                shader_map::bytes(self),
+                self.node_bytes(),
             );
         }
         if self.cascades > 0 {

@@ -1,9 +1,9 @@
 //! The terrain pass.
 
 use super::Forest;
-use super::shader_map::ShaderMap;
 use super::shadows::TerrainPush;
 use super::targets::ImageTargets;
+use super::trees::shader_map::ShaderMap;
 use crate::Result;
 use crate::forest::coverage;
 use crate::forest::terrain::{TerrainData, TerrainDraws};

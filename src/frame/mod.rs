@@ -1,7 +1,6 @@
 //! A frame: every pass in order, in [`Renderer::render`].
 
 pub mod ground;
-pub mod shader_map;
 pub mod shadows;
 pub mod sky;
 pub mod targets;
@@ -29,12 +28,12 @@ use crate::plan::Plan;
 use crate::scene::{Camera, Scene, Sun};
 use crate::{Error, Result};
 use ground::Ground;
-use shader_map::ShaderMap;
 use shadows::Shadows;
 use sky::SkyPass;
 use targets::ImageTargets;
 use tonemap::Tonemap;
-use trees::Trees;
+use trees::shader_map::ShaderMap;
+use trees::zfield::Trees;
 
 /// What lives between frames for the trees; absent from scenes without.
 pub struct Forest {

@@ -71,7 +71,11 @@ impl Shadows {
                 program(&shaders::FRAME_TERRAIN_SHADOW_VERT, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[])?,
                 plan.z_fields
                     .then(|| {
-                        program(&shaders::FRAME_TREE_SHADOW_VERT, &shaders::FRAME_TREE_SHADOW_FRAG, &views)
+                        program(
+                            &shaders::FRAME_TREES_ZFIELD_SHADOW_VERT,
+                            &shaders::FRAME_TREES_ZFIELD_SHADOW_FRAG,
+                            &views,
+                        )
                     })
                     .transpose()?,
             )),

@@ -9,7 +9,7 @@ use crate::physics::transfer::{self, TERMS};
 use crate::physics::views::{self, Basis};
 use crate::physics::zfield::AGREEMENT;
 
-/// Shadows fainter than this are not drawn (`shaders/frame/tree_shadow.frag`).
+/// Shadows fainter than this are not drawn (`shaders/frame/trees/zfield_shadow.frag`).
 const FAINTEST: f32 = 1.0 / 64.0;
 
 /// One mip level, with a border of empty texels: outside lies transparent black.

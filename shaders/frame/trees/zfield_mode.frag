@@ -2,7 +2,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
-#include "frame/tree_shade.glsl"
+#include "frame/trees/zfield_shade.glsl"
 #include "frame/view_mode.glsl"
 
 layout(location = 0) out vec4 colour;

@@ -1,9 +1,9 @@
 //! The tree pass: one quad a tree, front to back, each with its own sample mask (BN12, section 5 and 8).
 
-use super::Forest;
-use super::targets::ImageTargets;
 use crate::Result;
 use crate::forest::cull::CullData;
+use crate::frame::Forest;
+use crate::frame::targets::ImageTargets;
 use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand};
 use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets, shaders,
@@ -29,11 +29,11 @@ impl Trees {
         let before = s.view_iterations - 1;
         let program = |estimates: u32, magnified: bool, converged: bool| {
             gpu.graphics(&GraphicsDesc {
-                vert: &shaders::FRAME_TREE_VERT,
+                vert: &shaders::FRAME_TREES_ZFIELD_VERT,
                 frag: match plan.view_mode {
-                    ViewMode::Radiance if plan.layers => &shaders::FRAME_TREE_LAYERS_FRAG,
-                    ViewMode::Radiance => &shaders::FRAME_TREE_FRAG,
-                    _ => &shaders::FRAME_TREE_MODE_FRAG,
+                    ViewMode::Radiance if plan.layers => &shaders::FRAME_TREES_ZFIELD_LAYERS_FRAG,
+                    ViewMode::Radiance => &shaders::FRAME_TREES_ZFIELD_FRAG,
+                    _ => &shaders::FRAME_TREES_ZFIELD_MODE_FRAG,
                 },
                 colors: &formats,
                 samples: plan.samples,

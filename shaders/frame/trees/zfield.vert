@@ -7,7 +7,7 @@
 #include "physics/light.glsl"
 #include "physics/transfer.glsl"
 #include "physics/zfield.glsl"
-#include "frame/tree_space.glsl"
+#include "frame/trees/zfield_space.glsl"
 
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(std430, binding = 1) readonly buffer Trees { Tree items[]; } trees;

@@ -14,7 +14,7 @@ layout(binding = 3) uniform sampler2DArray slope_tiles;
 layout(binding = 6) uniform sampler2DArray cover_tiles;
 layout(std430, binding = 7) writeonly buffer Nodes { ForestNode items[]; } nodes;
 layout(constant_id = 0) const uint COVER_CHANNELS = 0u;
-#include "frame/shader_map.glsl"
+#include "frame/trees/shader_map.glsl"
 
 ForestNode node(TerrainQuad q, ivec2 at) {
     vec2 within;

@@ -1,10 +1,9 @@
 //! The shader-map pass: forest fractions and radiances from the tables, at every second vertex of the terrain (BN12, section 6).
 
-use super::Forest;
 use crate::Result;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
+use crate::frame::Forest;
 use crate::frame::shadows::TerrainPush;
-use crate::gpu::interface::{FOREST_NODES, ForestNode};
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
 use crate::plan::Plan;
 
@@ -15,11 +14,6 @@ pub struct ShaderMap {
     program: Program,
 }
 
-/// Bytes of the nodes of a plan.
-pub fn bytes(plan: &Plan) -> u64 {
-    u64::from(plan.terrain_tiles) * u64::from(FOREST_NODES * FOREST_NODES) * size_of::<ForestNode>() as u64
-}
-
 impl ShaderMap {
     /// Allocates for a plan.
     ///
@@ -28,9 +22,9 @@ impl ShaderMap {
     pub fn new(gpu: &Gpu, plan: &Plan, forest: &Forest) -> Result<Self> {
         let float = |n: u32| (n as f32).to_bits();
         Ok(ShaderMap {
-            nodes: gpu.buffer("shader-map nodes", bytes(plan))?,
+            nodes: gpu.buffer("shader-map nodes", plan.node_bytes())?,
             program: gpu.compute(
-                &shaders::FRAME_SHADER_MAP_COMP,
+                &shaders::FRAME_TREES_SHADER_MAP_COMP,
                 &[
                     (0, plan.cover_channels),
                     (2, forest.species.count),

@@ -1,0 +1,4 @@
+//! Trees in a frame, one file a representation.
+
+pub mod shader_map;
+pub mod zfield;
