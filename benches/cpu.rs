@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopy::bake::{BakeSettings, ForestSettings, bake_species, load_or_bake, load_or_measure};
-use canopy::forest::pattern::Pattern;
-use canopy::forest::quadtree::{MIN_REFINE, Quadtree};
-use canopy::frame::camera::Eye;
+use canopy::camera::Eye;
+use canopy::land::pattern::Pattern;
+use canopy::land::quadtree::{MIN_REFINE, Quadtree};
 use canopy::physics::terrain::height_and_slope;
 use canopy::plan::Plan;
 use canopy::scene::{self, OpticsOverride, model};

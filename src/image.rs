@@ -7,13 +7,8 @@ use std::path::Path;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image as ExrImage, Layer, LayerAttributes, WritableImage,
 };
-use half::f16;
 
 use crate::files::write_whole;
-use crate::frame::camera::NEAR_PLANE;
-use crate::frame::targets::ImageTargets;
-use crate::gpu::Gpu;
-use crate::plan::Plan;
 use crate::{Error, Result};
 pub use layers::Layers;
 
@@ -68,34 +63,6 @@ impl Linear {
 }
 
 impl Picture {
-    /// Reads the targets of a frame drawn with radiances times `scale`.
-    ///
-    /// # Errors
-    /// [`Error::Device`] if the device fails.
-    pub fn read(gpu: &Gpu, plan: &Plan, targets: &ImageTargets, scale: f64) -> Result<Self> {
-        let pixels = plan.size[0] as usize * plan.size[1] as usize;
-        let words: Vec<u32> = gpu.read(&targets.picture, 0, pixels)?;
-        let display = bytemuck::cast_slice(&words).to_vec();
-        let linear = plan.layers.then(|| -> Result<Linear> {
-            let part = |k: usize| gpu.read_image::<[u16; 4]>(&targets.colors[k].image, 0, 0);
-            let (sun, sky) = (part(0)?, part(1)?);
-            let rgb =
-                |t: &[u16; 4]| [0, 1, 2].map(|k| (f64::from(f16::from_bits(t[k]).to_f32()) / scale) as f32);
-            let depth = gpu.read_image::<f32>(&targets.depth.image, 0, 0)?;
-            Ok(Linear {
-                sun: sun.iter().map(rgb).collect(),
-                sky: sky.iter().map(rgb).collect(),
-                // Reverse Z with an infinite far plane: depth = near / distance.
-                depth: depth.iter().map(|z| if *z > 0.0 { NEAR_PLANE as f32 / z } else { 0.0 }).collect(),
-                coverage: sky.iter().map(|t| f16::from_bits(t[3]).to_f32()).collect(),
-                species: gpu.read_image(&targets.colors[2].image, 0, 0)?,
-                fractions: part(3)?.iter().map(|t| t.map(|v| f16::from_bits(v).to_f32())).collect(),
-                noise: None,
-            })
-        });
-        Ok(Picture { size: plan.size, display, linear: linear.transpose()? })
-    }
-
     /// The display picture without alpha.
     pub fn rgb(&self) -> Vec<u8> {
         self.display.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()

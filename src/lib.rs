@@ -14,7 +14,7 @@
 //! let baked = canopy::bake::load_or_bake_scene(&scene, cache.as_deref(), false)?;
 //! let baked: Vec<_> = baked.into_iter().map(|(species, _)| species).collect();
 //! let mut renderer = canopy::frame::Renderer::new(&gpu, scene.clone(), plan, &baked)?;
-//! renderer.render(&camera, canopy::frame::auto_exposure(&scene))?;
+//! renderer.render(&camera, canopy::camera::auto_exposure(&scene))?;
 //! renderer.picture()?.write_png("ridge.png".as_ref())?;
 //! drop(renderer);
 //! gpu.close() // Reports what the validation layers said, and what is still allocated.
@@ -30,23 +30,23 @@
 //!
 //! | paper | module | shader | test |
 //! |---|---|---|---|
-//! | BN12 §3, terrain quadtree | [`forest::terrain`], [`forest::quadtree`], [`physics::terrain`] | `forest/terrain_tile.comp`, `physics/terrain.glsl` | `tests/gpu/ground.rs` |
-//! | BN12 §4, seeds from densities | [`forest::seeds`], [`forest::candidate`], [`forest::pattern`], [`forest::listed`] | `forest/seeds.comp`, `forest/candidate.glsl`, `forest/density.glsl` | `tests/gpu/seeds.rs` |
+//! | BN12 §3, terrain quadtree | [`forest::terrain`], [`land::quadtree`], [`physics::terrain`] | `forest/terrain_tile.comp`, `physics/terrain.glsl` | `tests/gpu/ground.rs` |
+//! | BN12 §4, seeds from densities | [`forest::seeds`], [`land::candidate`], [`land::pattern`], [`land::listed`] | `forest/seeds.comp`, `land/candidate.glsl`, `land/density.glsl` | `tests/gpu/seeds.rs` |
 //! | BN12 §4, coverage | [`forest::coverage`] | `forest/coverage*`, `frame/cover.glsl` | `tests/gpu/coverage.rs` |
 //! | BN12 §5, views of a z-field | [`bake`], [`physics::views`] | `physics/views.glsl` | `tests/views.rs`, `tests/bake.rs`, `tests/gpu/views.rs` |
 //! | BN12 §5, surface along a ray | [`physics::zfield`] | `physics/zfield.glsl` | `tests/zfield.rs`, `tests/zfield_quality.rs`, `tests/gpu/zfield.rs` |
-//! | BN12 eq. 7–12, light | [`physics::light`] | `physics/light.glsl`, `frame/tree_shade.glsl`, `frame/ground.glsl` | `tests/gpu/light.rs`, `tests/gpu/light_on_ground.rs` |
-//! | self-shadow and leaf angles, measured instead of BN12 eq. 7 and 8 | [`bake`], [`physics::light::self_shadow`] | `physics/light.glsl`, `frame/tree_shade.glsl` | `tests/bake.rs`, `tests/gpu/light.rs` |
-//! | light transfer (Sloan et al. 2002) of z-field texels | [`bake`], [`physics::transfer`] | `physics/transfer.glsl`, `frame/tree_shade.glsl` | `tests/bake.rs`, `tests/gpu/transfer.rs` |
+//! | BN12 eq. 7–12, light | [`physics::light`] | `physics/light.glsl`, `frame/trees/zfield_shade.glsl`, `frame/ground.glsl` | `tests/gpu/light.rs`, `tests/gpu/light_on_ground.rs` |
+//! | self-shadow and leaf angles, measured instead of BN12 eq. 7 and 8 | [`bake`], [`physics::light::self_shadow`] | `physics/light.glsl`, `frame/trees/zfield_shade.glsl` | `tests/bake.rs`, `tests/gpu/light.rs` |
+//! | light transfer (Sloan et al. 2002) of z-field texels | [`bake`], [`physics::transfer`] | `physics/transfer.glsl`, `frame/trees/zfield_shade.glsl` | `tests/bake.rs`, `tests/gpu/transfer.rs` |
 //! | BN12 §6, tables G, T, D, E of far forests | [`bake::tables`], [`forest::tables`], [`physics::tables`] | `physics/tables.glsl` | `tests/tables.rs`, `tests/gpu/tables.rs` |
-//! | BN12 §6, eq. 13–21, shader-map | [`frame::shader_map`] | `frame/shader_map.*`, `frame/ground.glsl` | `tests/gpu/shader_map.rs` |
+//! | BN12 §6, eq. 13–21, shader-map | [`frame::trees::shader_map`] | `frame/trees/shader_map.*`, `frame/ground.glsl` | `tests/gpu/shader_map.rs` |
 //! | BN12 §7, eq. 22–27, hand-over | [`physics::handover`] | `physics/handover.glsl` | `tests/gpu/tables.rs`, `tests/proofs/` |
 //! | BN12 §9, figures 7 and 8 | [`measure::reflectance`] | | `tests/proofs/scale.rs`, `tests/cli.rs` |
 //! | BN12 §8, culling in order | [`forest::cull`] | `forest/cull.comp`, `forest/scan.comp`, `forest/compact.comp` | `tests/gpu/cull.rs` |
-//! | BN12 §7, trees on silhouettes beyond the hand-over | [`forest::silhouette`] | `forest/silhouette.glsl` | `tests/gpu/silhouettes.rs` |
+//! | BN12 §7, trees on silhouettes beyond the hand-over | [`land::silhouette`] | `land/silhouette.glsl` | `tests/gpu/silhouettes.rs` |
 //! | BN12 §8, sub-pixel masks | [`physics::masks`] | `physics/masks.glsl` | `measure/conform/law.rs`, `tests/conform.rs` |
 //! | Monte-Carlo reference (Kajiya 1986), error of every pixel | [`mod@reference`] | | `tests/reference.rs` |
-//! | parallel-split shadow maps (Zhang et al. 2006) | [`frame::cascades`], [`frame::shadows`] | `frame/tree_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
+//! | parallel-split shadow maps (Zhang et al. 2006) | [`camera::cascades`], [`frame::shadows`] | `frame/trees/zfield_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
 //! | trees that need no file (Weber and Penn 1995) | [`tree`] | | `tests/trees.rs` |
 //! | the scene file | [`scene`] | | `tests/scene_inputs.rs`, `tests/model_inputs.rs` |
 //! | conformance of a driver | [`measure::conform`] | `probe/*` | `tests/conform.rs`, `tests/conformance/`, `tests/proofs/planted.rs` |
@@ -69,6 +69,7 @@
 #![warn(missing_docs)]
 
 pub mod bake;
+pub mod camera;
 pub mod clock;
 pub mod error;
 pub mod files;
@@ -76,10 +77,12 @@ pub mod forest;
 pub mod frame;
 pub mod gpu;
 pub mod image;
+pub mod land;
 pub mod measure;
 pub mod physics;
 pub mod plan;
 pub mod progress;
+pub mod rays;
 pub mod reference;
 pub mod scene;
 pub mod settings;

@@ -1,18 +1,17 @@
 //! What a scene requires: every table, view set, cache, target and pass, with the reason and the bytes, before anything
 //! is allocated. What no one needs is not in the plan, and is not built.
 
-use crate::forest::candidate::{Layout, POINTS};
-use crate::forest::pattern::Pattern;
-use crate::forest::quadtree::{MIN_REFINE, quad_count};
-use crate::forest::seeds::fullest_listed;
-use crate::forest::species::density_map_size;
-use crate::frame::camera::Eye;
-use crate::frame::shader_map;
+use crate::camera::Eye;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
-use crate::physics::terrain::height_at;
+use crate::land::candidate::{Layout, POINTS};
+use crate::land::density::density_map_size;
+use crate::land::listed::fullest_listed;
+use crate::land::pattern::Pattern;
+use crate::land::quadtree::{MIN_REFINE, quad_count};
+use crate::physics::raster::Raster;
 use crate::physics::views;
-use crate::scene::{Albedo, Camera, Distribution, Raster, Scene, Sky};
+use crate::scene::{Albedo, Camera, Distribution, Scene, Sky};
 use crate::{Error, Result};
 
 /// Seed quads along the range, at most.
@@ -256,11 +255,7 @@ impl Plan {
             items: Vec::new(),
             representation,
             view_mode: ViewMode::Radiance,
-            rasterizer: if std::env::var("CANOPY_GRAPHICS").is_ok() || layers {
-                Rasterizer::Graphics
-            } else {
-                Rasterizer::auto(device)
-            },
+            rasterizer: if layers { Rasterizer::Graphics } else { Rasterizer::auto(device) },
             size: eye.size,
             samples: samples(s.samples, device),
             layers,
@@ -343,6 +338,12 @@ impl Plan {
         self.cover_channels.div_ceil(4)
     }
 
+    /// Bytes of the shader-map's nodes.
+    pub fn node_bytes(&self) -> u64 {
+        let nodes = u64::from(self.terrain_tiles) * u64::from(gpu::FOREST_NODES * gpu::FOREST_NODES);
+        nodes * size_of::<gpu::ForestNode>() as u64
+    }
+
     /// Whether any tree on ground of this extent between two heights may be near enough to a place to be drawn by itself:
     /// whether the box of their centres reaches into the range, with room for the rounding of single precision.
     pub fn trees_in_range(&self, extent: [f64; 2], [lowest, highest]: [f64; 2], place: [f64; 3]) -> bool {
@@ -357,7 +358,7 @@ impl Plan {
     fn scene_in_range(&self, scene: &Scene, place: [f64; 3]) -> bool {
         let terrain = &scene.terrain;
         let [x, y] = [0, 1].map(|k| place[k].clamp(0.0, terrain.extent[k]));
-        self.trees_in_range(terrain.extent, [height_at(terrain, x, y); 2], place)
+        self.trees_in_range(terrain.extent, [terrain.height_at(x, y); 2], place)
             || terrain
                 .heights
                 .as_ref()
@@ -592,7 +593,7 @@ impl Plan {
                 "target",
                 "shader-map nodes",
                 format!("trees far away on {} quads of terrain", self.terrain_tiles),
-                shader_map::bytes(self),
+                self.node_bytes(),
             );
         }
         if self.cascades > 0 {

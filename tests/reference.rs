@@ -9,10 +9,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use canopy::frame::camera::Eye;
+use canopy::camera::Eye;
 use canopy::physics::hash::Stream;
+use canopy::physics::raster::Raster;
 use canopy::reference::{Estimate, Light, Options, Until, World};
-use canopy::scene::{self, Distribution, Material, Mesh, Raster, Scene, Sky, TreePosition};
+use canopy::scene::{self, Distribution, Material, Mesh, Scene, Sky, TreePosition};
 use common::{ellipsoid, material, push_triangle};
 
 /// A scene of one species with this mesh, and trees where they are listed.

@@ -7,10 +7,10 @@ use std::fs;
 use std::sync::OnceLock;
 
 use canopy::bake::tables::{
-    Cast, Crown, FieldCrown, ForestSettings, ForestTables, LeafOptics, Seen, Shape, key, load_or_measure,
-    measure, path,
+    Cast, Crown, FieldCrown, ForestSettings, LeafOptics, Seen, Shape, key, load_or_measure, measure, path,
 };
 use canopy::bake::{BakeSettings, CacheState, SpeciesBake, bake_species};
+use canopy::physics::tables::ForestTables;
 use canopy::physics::{light, tables, views, zfield};
 use glam::DVec3;
 

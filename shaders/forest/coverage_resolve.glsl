@@ -17,7 +17,7 @@ layout(push_constant) uniform Push { SeedParameters p; CoverageParameters c; };
 layout(constant_id = 0) const uint SIDE = 256u;
 layout(constant_id = 1) const uint SPECIES_COUNT = 1u;
 
-#include "forest/density.glsl"
+#include "land/density.glsl"
 #include "forest/coverage.glsl"
 #include "forest/expected.glsl"
 

@@ -21,8 +21,8 @@ layout(std430, binding = 9) readonly buffer SceneSize { uint species_count; } sc
 layout(push_constant) uniform Push { SeedParameters p; CoverageParameters c; };
 layout(constant_id = 0) const uint SIDE = 256u;
 
-#include "forest/density.glsl"
-#include "forest/candidate.glsl"
+#include "land/density.glsl"
+#include "land/candidate.glsl"
 #include "forest/coverage.glsl"
 
 shared uint drawn;

@@ -1,7 +1,7 @@
 // The decision of the cull. `precise` and a fixed order of operations let src/forest/cull.rs agree to the bit.
 // Needs physics/hash.glsl.
 
-#include "forest/silhouette.glsl"
+#include "land/silhouette.glsl"
 
 const uint CLASS_CAMERA = 1u << 5u;   // low five bits: distance bin
 const uint CLASS_CASCADE = 1u << 8u;  // and three more for the other cascades

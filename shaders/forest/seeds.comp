@@ -18,8 +18,8 @@ layout(binding = 7) uniform sampler2DArray densities;
 layout(std430, binding = 8) readonly buffer SceneSize { uint species_count; } scene_size;
 layout(push_constant) uniform Push { SeedParameters p; };
 
-#include "forest/density.glsl"
-#include "forest/candidate.glsl"
+#include "land/density.glsl"
+#include "land/candidate.glsl"
 
 shared uint kept[8];
 

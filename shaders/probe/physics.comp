@@ -75,7 +75,7 @@ void main() {
             r.a = floatBitsToUint(vec4(at, table_density(b.x, b.y, b.z)));
             break;
         }
-        // As frame/tree.vert and frame/tree_shade.glsl share it between them.
+        // As frame/trees/zfield.vert and frame/trees/zfield_shade.glsl share it between them.
         case 15u: r.a.x = floatBitsToUint(self_shadow(a.z * sqrt(a.x), a.w * a.x, a.y)); break;
         case 16u: {
             float x = dot(transfer_decode(a), transfer_first(c.xyz)) + dot(transfer_decode(b), transfer_second(c.xyz));

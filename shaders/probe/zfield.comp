@@ -31,7 +31,7 @@ void main() {
         p[i] = vec3(dot(b.u.xyz, ray.origin.xyz), dot(b.v.xyz, ray.origin.xyz), dot(b.depth.xyz, ray.origin.xyz));
         d[i] = vec3(dot(b.u.xyz, ray.to.xyz), dot(b.v.xyz, ray.to.xyz), dot(b.depth.xyz, ray.to.xyz));
     }
-    // Filtered where texels are magnified, as in frame/tree.vert.
+    // Filtered where texels are magnified, as in frame/trees/zfield.vert.
     uint before = uint(ray.to.w) - 1u;
     bool magnified = ray.origin.w < 0.5;
     Surface at = zfield_search(views, p, d, vec3(layers), weights, ray.origin.w, magnified ? 0u : before,

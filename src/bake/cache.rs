@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::file::{Fields, Format, load_or_build};
-use super::{BakeSettings, SpeciesBake, Transfer, Turned, ZField, bake_species, check};
+use super::{BakeSettings, SpeciesBake, Turned, bake_species, check};
 use crate::Result;
+use crate::physics::transfer::Transfer;
 use crate::physics::views;
+use crate::physics::zfield::ZField;
 use crate::scene::{Mesh, OpticsOverride};
 
 const FORMAT: Format = Format { magic: *b"CANOPYZF", version: 13, extension: "zfield" };

@@ -6,7 +6,6 @@ pub mod file;
 mod occlusion;
 pub(crate) mod optics;
 mod raster;
-pub(crate) mod rays;
 mod scene;
 mod self_shadow;
 pub(crate) mod surface;
@@ -18,9 +17,11 @@ mod views;
 pub use cache::{CacheState, load_or_bake};
 pub use scene::{Baked, BakedFrom, forest_settings, load_or_bake_scene, pattern_density};
 pub use self_shadow::{LitCell, lit_cells};
-pub use tables::{ForestSettings, ForestTables, load_or_measure};
+pub use tables::{ForestSettings, load_or_measure};
 pub use verify::{QualityReport, ViewQuality, demand, verify};
 
+use crate::physics::transfer::Transfer;
+use crate::physics::zfield::ZField;
 use crate::progress::Progress;
 use crate::scene::{Mesh, OpticsOverride};
 use crate::settings::Settings;
@@ -106,27 +107,6 @@ impl SpeciesBake {
     pub fn albedo(&self) -> [f32; 3] {
         std::array::from_fn(|i| self.reflectance[i] + self.transmittance[i])
     }
-}
-
-/// Depth views of one tree: a texture array with one layer a view and mip levels down to 1 × 1.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ZField {
-    /// n of the 2n(n+1)+1 views.
-    pub n: u32,
-    /// Texels a side of level 0; a power of two.
-    pub resolution: u32,
-    /// Per level, all layers one after the other, rows from the bottom (v = 0) up, RGBA8:
-    /// premultiplied nearest depth, farthest depth, occlusion; opacity.
-    pub levels: Vec<Vec<u8>>,
-}
-
-/// Light transfer ([`crate::physics::transfer`]) of the views of a z-field: a texture array like its own, but smaller.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Transfer {
-    /// Texels a side of level 0: half of the views'.
-    pub resolution: u32,
-    /// Per band and level, all layers one after the other, rows from the bottom (v = 0) up: coefficients of each texel, encoded.
-    pub bands: Vec<Vec<Vec<u8>>>,
 }
 
 /// What a bake depends on beside the mesh.

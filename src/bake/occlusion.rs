@@ -19,9 +19,9 @@ use std::f32::consts::TAU;
 use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 
-use super::rays::Rays;
-use super::surface::Surface;
+use super::surface::{Caster, Surface};
 use crate::progress::Progress;
+use crate::rays::Stack;
 
 /// Grid cells along the longest side of the tree.
 const CELLS: u32 = 96;
@@ -58,7 +58,7 @@ impl Occlusion {
         let count = (size.x * size.y * size.z) as usize;
         let mut grid = Occlusion { cells: per_axis.as_vec3() / 2.0, size, values: vec![0.0; count] };
         let points = grid.points(surface, solid);
-        let caster = Rays::new(surface);
+        let caster = Caster::new(surface);
         // Off the surface by a thousandth of a cell.
         let offset = 2e-3 * scale.max_element() / CELLS as f32;
         let rays = rays.div_ceil(POINTS);
@@ -66,9 +66,10 @@ impl Occlusion {
         let seen: Vec<f32> = points
             .par_iter()
             .enumerate()
-            .map(|(i, point)| {
+            .map_init(Stack::new, |stack, (i, point)| {
                 progress.step(1);
-                visibility(&caster, surface.frame.to_metres(point.p), point.normal, offset, rays, i as u32)
+                let p = surface.frame.to_metres(point.p);
+                visibility(&caster, (p, point.normal), offset, rays, i as u32, stack)
             })
             .collect();
         progress.finish();
@@ -163,13 +164,21 @@ impl Occlusion {
 }
 
 /// δ at a point, in metres; `normal` is zero for a leaf. Below the ground nothing is seen.
-fn visibility(caster: &Rays, p: Vec3, normal: Vec3, offset: f32, rays: u32, seed: u32) -> f32 {
+fn visibility(
+    caster: &Caster,
+    (p, normal): (Vec3, Vec3),
+    offset: f32,
+    rays: u32,
+    seed: u32,
+    stack: &mut Stack,
+) -> f32 {
     if p.z < -offset {
         return 0.0;
     }
     let origin = p + normal * offset;
     let open = (0..rays).map(|k| sky_direction(k, rays, seed)).filter(|&direction| {
-        (normal == Vec3::ZERO || normal.dot(direction) > 0.0) && !caster.occluded(origin, direction, offset)
+        (normal == Vec3::ZERO || normal.dot(direction) > 0.0)
+            && !caster.occluded(origin, direction, offset, stack)
     });
     open.count() as f32 / rays as f32
 }
@@ -240,8 +249,8 @@ mod tests {
         quad(&mut mesh, wide(2.0), Vec3::X * 100.0, Vec3::Y * 100.0);
         quad(&mut mesh, wide(0.1), Vec3::X * 100.0, Vec3::Y * 100.0);
         let (surface, _) = bake(&mesh, 8);
-        let caster = Rays::new(&surface);
-        let seen = |p| visibility(&caster, p, Vec3::ZERO, 1e-4, 4096, 1);
+        let caster = Caster::new(&surface);
+        let seen = |p| visibility(&caster, (p, Vec3::ZERO), 1e-4, 4096, 1, &mut Stack::new());
         // Under the roof, the sky is seen past its edge only: elevation under 1/50 rad.
         assert!(seen(Vec3::new(0.0, 0.0, 1.0)) < 0.03);
         assert_eq!(seen(Vec3::new(0.0, 0.0, 2.5)), 1.0);
@@ -251,8 +260,9 @@ mod tests {
         quad(&mut mesh, Vec3::new(0.0, -500.0, 0.0), Vec3::Y * 1000.0, Vec3::Z * 500.0);
         quad(&mut mesh, Vec3::new(-1.0, 0.0, 0.0), Vec3::X, Vec3::Z);
         let (surface, _) = bake(&mesh, 8);
-        let caster = Rays::new(&surface);
-        let wall = visibility(&caster, Vec3::new(0.1, 0.0, 1.0), Vec3::ZERO, 1e-4, 4096, 1);
+        let caster = Caster::new(&surface);
+        let wall =
+            visibility(&caster, (Vec3::new(0.1, 0.0, 1.0), Vec3::ZERO), 1e-4, 4096, 1, &mut Stack::new());
         assert!((wall - 0.5).abs() < 0.01, "{wall}");
     }
 
@@ -288,12 +298,12 @@ mod tests {
             quad(&mut mesh, center - 0.5 * (a + b), a, b);
         }
         let (surface, occlusion) = bake(&mesh, 128);
-        let caster = Rays::new(&surface);
+        let caster = Caster::new(&surface);
         let (mut square, mut bias) = (0.0, 0.0);
         for (i, face) in surface.faces.iter().enumerate().step_by(8) {
             let p = (face.p[0] + face.p[1] + face.p[2]) / 3.0;
             let metres = surface.frame.to_metres(p);
-            let truth = visibility(&caster, metres, Vec3::ZERO, 1e-4, 4096, i as u32);
+            let truth = visibility(&caster, (metres, Vec3::ZERO), 1e-4, 4096, i as u32, &mut Stack::new());
             let error = occlusion.at(p) - truth;
             square += error * error / 100.0;
             bias += error / 100.0;

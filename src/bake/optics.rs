@@ -12,9 +12,11 @@ use std::collections::HashSet;
 use glam::{Vec2, Vec3};
 
 use super::surface::Surface;
-use super::{SpeciesBake, Transfer, ZField, self_shadow};
+use super::{SpeciesBake, self_shadow};
 use crate::physics::tonemap::linear as linear_from_srgb;
+use crate::physics::transfer::Transfer;
 use crate::physics::views;
+use crate::physics::zfield::ZField;
 use crate::scene::{Material, Mesh, OpticsOverride, Texture};
 
 /// Subdivisions a side of a triangle for measuring masks and colours: 256 equal parts, sampled in the middle.

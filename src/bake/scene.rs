@@ -3,8 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{CacheState, ForestSettings, ForestTables, SpeciesBake, load_or_bake, load_or_measure};
+use super::{CacheState, ForestSettings, SpeciesBake, load_or_bake, load_or_measure};
 use crate::Result;
+use crate::physics::tables::ForestTables;
 use crate::scene::{Distribution, Scene};
 
 /// One species, ready to draw.

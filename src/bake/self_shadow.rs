@@ -16,14 +16,15 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::rays::Rays;
-use super::surface::Surface;
-use super::{SpeciesBake, Turned, ZField};
+use super::surface::{Caster, Surface};
+use super::{SpeciesBake, Turned};
 use crate::Result;
 use crate::physics::hash::{Stream, hash2};
 use crate::physics::light;
 use crate::physics::views::{self, Basis};
+use crate::physics::zfield::ZField;
 use crate::physics::zfield::{self, Ray};
+use crate::rays::{Met, Stack};
 use crate::scene::Mesh;
 
 /// Pairs of rays: every cell that matters then has hundreds, and P of it a standard error of a few hundredths.
@@ -105,13 +106,13 @@ pub fn measure(surface: &Surface, matter: &Matter, field: &ZField) -> Measured {
 }
 
 fn samples(surface: &Surface, matter: &Matter, field: &ZField, seed: u32) -> Vec<Sample> {
-    let rays = Rays::new(surface);
+    let rays = Caster::new(surface);
     let mesh = (surface, matter, &rays);
     (0..PAIRS / CHUNK)
         .into_par_iter()
         .flat_map_iter(|k| {
-            let mut stream = Stream::new(hash2(seed, k));
-            (0..CHUNK).filter_map(|_| sample(mesh, field, &mut stream)).collect::<Vec<_>>()
+            let (mut stream, mut stack) = (Stream::new(hash2(seed, k)), Stack::new());
+            (0..CHUNK).filter_map(|_| sample(mesh, field, &mut stream, &mut stack)).collect::<Vec<_>>()
         })
         .collect()
 }
@@ -174,9 +175,10 @@ fn direction(stream: &mut Stream) -> DVec3 {
 }
 
 fn sample(
-    (surface, matter, rays): (&Surface, &Matter, &Rays),
+    (surface, matter, rays): (&Surface, &Matter, &Caster),
     field: &ZField,
     stream: &mut Stream,
+    stack: &mut Stack,
 ) -> Option<Sample> {
     let view = direction(stream);
     let (other, near, turn) = (direction(stream), stream.unit(), stream.unit());
@@ -194,7 +196,7 @@ fn sample(
     // From beyond the cylinder, which is no farther than sqrt 2 from its centre.
     let from = surface.frame.to_metres((origin + 2.0 * basis.w).as_vec3());
     let (eye, to_sun) = (view.as_vec3(), sun.as_vec3());
-    let (t, face) = rays.first(from, -eye)?;
+    let Met { t, face, .. } = rays.first(from, -eye, stack)?;
     let hit = from - eye * t;
     let w = (sun / scale).normalize();
     let metres = zfield::light_ray(field, 0, seen.point, w, 1).s * (w * scale).length();
@@ -205,7 +207,7 @@ fn sample(
         angle: light::angle_between(view.into(), sun.into()),
         metres: metres.max(0.0),
         alpha: seen.alpha,
-        lit: !rays.occluded(hit, to_sun, 1e-4 * surface.frame.half_height),
+        lit: !rays.occluded(hit, to_sun, 1e-4 * surface.frame.half_height, stack),
         leaf: (hit.z > matter.base).then_some((
             foliage,
             seen_from * lit_from > 0.0,

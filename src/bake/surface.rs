@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::rays::{Met, Stack, Triangles};
 use crate::scene::{Material, Mesh};
 use crate::{Error, Result};
 
@@ -164,5 +165,46 @@ impl Surface {
     #[inline]
     pub fn opaque(&self, face: &Face, uv: Vec2) -> bool {
         face.mask.is_none_or(|m| self.masks[m as usize].opaque(uv))
+    }
+
+    /// The same by a face's index, where the second and third corner have these barycentric coordinates.
+    #[inline]
+    pub fn is_at(&self, face: u32, u: f32, v: f32) -> bool {
+        let f = &self.faces[face as usize];
+        f.mask.is_none() || self.opaque(f, f.uv[0] * (1.0 - u - v) + f.uv[1] * u + f.uv[2] * v)
+    }
+}
+
+/// A surface that rays are cast at, in metres, through the leaf masks.
+pub struct Caster<'a> {
+    surface: &'a Surface,
+    triangles: Triangles,
+    /// Unit normals of the faces, to either side.
+    normals: Vec<Vec3>,
+}
+
+impl<'a> Caster<'a> {
+    /// Builds the hierarchy.
+    pub fn new(surface: &'a Surface) -> Self {
+        let corners: Vec<[Vec3; 3]> =
+            surface.faces.iter().map(|f| f.p.map(|p| surface.frame.to_metres(p))).collect();
+        let normal = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a).normalize_or_zero();
+        Caster { surface, normals: corners.iter().map(normal).collect(), triangles: Triangles::new(&corners) }
+    }
+
+    /// Whether any surface lies on the ray beyond the parameter `t_min`.
+    pub fn occluded(&self, origin: Vec3, direction: Vec3, t_min: f32, stack: &mut Stack) -> bool {
+        self.triangles.occluded(origin, direction, t_min, stack, |f, u, v| self.surface.is_at(f, u, v))
+    }
+
+    /// The first surface on the ray, if there is any.
+    pub fn first(&self, origin: Vec3, direction: Vec3, stack: &mut Stack) -> Option<Met> {
+        let opaque = |face, u, v| self.surface.is_at(face, u, v);
+        self.triangles.nearest(origin, direction, f32::MAX, stack, opaque)
+    }
+
+    /// Unit normal of a face, to either side.
+    pub fn normal(&self, face: u32) -> Vec3 {
+        self.normals[face as usize]
     }
 }

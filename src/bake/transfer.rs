@@ -13,16 +13,17 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::SpeciesBake;
 use super::raster::{NO_FACE, Raster, SUBSAMPLES, View};
-use super::rays::Rays;
-use super::surface::Surface;
+use super::surface::{Caster, Surface};
 use super::tables::{Crown, FieldAim, FieldCrown, Shape};
 use super::views::rasters;
-use super::{SpeciesBake, Transfer};
 use crate::physics::light;
+use crate::physics::transfer::Transfer;
 use crate::physics::transfer::{self, TERMS};
 use crate::physics::views;
 use crate::progress::Progress;
+use crate::rays::Stack;
 use crate::scene::Mesh;
 
 /// Suns, evenly over the upper hemisphere: enough for eight coefficients of visibilities that are 0 or 1.
@@ -106,20 +107,22 @@ impl Sun {
 impl Points {
     fn new(surface: &Surface, suns: &[Sun], resolution: u32, quiet: bool) -> Self {
         let frame = surface.frame;
-        let rays = Rays::new(surface);
+        let rays = Caster::new(surface);
         let progress = Progress::new("baking light transfer: points", surface.faces.len() as u64, quiet);
         let per_face: Vec<Vec<Point>> = surface
             .faces
             .par_iter()
-            .map(|face| {
+            .map_init(Stack::new, |stack, face| {
                 progress.step(1);
                 let [a, b, c] = face.p.map(|p| frame.to_metres(p));
                 let area = 0.5 * (b - a).cross(c - a).length() / frame.radius.powi(2);
                 let tries =
                     ((POINTS * resolution as f32).powi(2) * area).ceil().clamp(1.0, MOST as f32) as u32;
                 let on = |k: u32| surface.spread(face, k).map(|(s, t)| a + (b - a) * s + (c - a) * t);
-                let free = |at: Vec3, sun: &Sun| !rays.occluded(at, sun.to, 1e-4 * frame.half_height);
-                let lit = |at: Vec3| suns.iter().enumerate().map(|(k, s)| u64::from(free(at, s)) << k).sum();
+                let mut free =
+                    |at: Vec3, sun: &Sun| !rays.occluded(at, sun.to, 1e-4 * frame.half_height, stack);
+                let mut lit =
+                    |at: Vec3| suns.iter().enumerate().map(|(k, s)| u64::from(free(at, s)) << k).sum();
                 (0..tries).filter_map(on).map(|at| Point { at, lit: lit(at) }).collect()
             })
             .collect();

@@ -4,11 +4,11 @@ use std::f32::consts::SQRT_2;
 
 use rayon::prelude::*;
 
-use super::ZField;
 use super::occlusion::Occlusion;
 use super::raster::{Raster, SUBSAMPLES, View};
 use super::surface::Surface;
 use crate::physics::views::{self, Basis};
+use crate::physics::zfield::ZField;
 use crate::progress::Progress;
 
 /// A depth in [−√2, √2] as stored: (d + √2)/(2√2).

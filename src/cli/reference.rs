@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use canopy::frame::camera::Eye;
+use canopy::camera::Eye;
 use canopy::progress::Progress;
 use canopy::reference::{Estimate, Options, Until, World};
 use canopy::scene::{Camera, Scene};

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use canopy::bake::{Baked, cache, load_or_bake_scene};
-use canopy::frame::camera::Eye;
-use canopy::frame::{FrameReport, Renderer, auto_exposure};
+use canopy::camera::{Eye, auto_exposure};
+use canopy::frame::{FrameReport, Renderer};
 use canopy::gpu::{DeviceInfo, FrameCapture, Gpu, PassTime};
 use canopy::measure::results::SceneIdentity;
 use canopy::measure::sweep::kept::{self, Choice, Subject};

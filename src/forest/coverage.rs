@@ -13,9 +13,8 @@
 //!   have texels of equal size.
 
 use super::cache::SlotCache;
-use super::quadtree::{QuadKey, Quadtree};
 use super::seeds::SeedData;
-use super::species::{SpeciesData, density_map_size};
+use super::species::SpeciesData;
 use super::terrain::{TerrainData, TerrainDraws};
 use crate::Result;
 use crate::gpu::interface::{
@@ -23,6 +22,8 @@ use crate::gpu::interface::{
     SeedParameters, SeedQuad, TERRAIN_CELLS,
 };
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Program, Recorder, Resource, Sampler, shaders, vk};
+use crate::land::density::density_map_size;
+use crate::land::quadtree::{QuadKey, Quadtree};
 use crate::plan::Plan;
 use crate::scene::{Distribution, Scene};
 

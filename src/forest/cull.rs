@@ -5,7 +5,6 @@
 //! memory decide any order, so the same seeds give the same bits. [`classify`] is the CPU's twin of the decision.
 
 use super::seeds::SeedData;
-use super::silhouette::clearance;
 use super::species::SpeciesData;
 use super::tables::TableData;
 use super::terrain::TerrainData;
@@ -14,9 +13,11 @@ use crate::gpu::interface::{
     Species, TREE_LISTS, Tree, View,
 };
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
+use crate::land::silhouette::clearance;
 use crate::physics::hash::{HASH_FADE, hash, unit};
+use crate::physics::raster::Raster;
 use crate::plan::Plan;
-use crate::scene::{Raster, Scene};
+use crate::scene::Scene;
 use crate::{Error, Result};
 
 const _: () = assert!(TREE_LISTS == 1 + DISTANCE_BINS + MAX_CASCADES);

@@ -1,17 +1,17 @@
 //! Tree seeds: which quads of ground have them, and where in the seed buffer.
 
-use std::collections::HashMap;
-
 use super::cache::SlotCache;
-use super::quadtree::{Bounds, Quadtree};
-use super::silhouette::{Ground, silhouette_quads};
-use super::species::{SpeciesData, density_map_size};
+use super::species::SpeciesData;
 use super::terrain::TerrainData;
-use crate::frame::camera::Eye;
-use crate::gpu::interface::{DrawCommand, ListedTree, Seed, SeedParameters, SeedQuad};
+use crate::camera::Eye;
+use crate::gpu::interface::{DrawCommand, Seed, SeedParameters, SeedQuad};
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
+use crate::land::density::density_map_size;
+use crate::land::listed::{ListedRanges, bin_listed};
+use crate::land::quadtree::{Bounds, Quadtree};
+use crate::land::silhouette::{Belt, Ground, silhouette_quads};
 use crate::plan::Plan;
-use crate::scene::{Distribution, Scene, Species};
+use crate::scene::{Scene, Species};
 use crate::{Error, Result};
 
 /// Seeds of the quads near the camera.
@@ -43,9 +43,6 @@ pub struct SeedData {
     program: Program,
     top: f64,
 }
-
-/// First and number of the listed trees of a quad.
-type ListedRanges = HashMap<(i32, i32), (u32, u32)>;
 
 /// What a frame has to produce.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -211,7 +208,13 @@ impl SeedData {
         visible: &mut Vec<(i32, i32)>,
     ) {
         let planes = eye.planes();
-        let mut beyond: Vec<(f64, (i32, i32))> = silhouette_quads(ground, eye, plan)
+        let belt = Belt {
+            from: plan.range,
+            to: plan.last_range(),
+            quad_side: plan.quad_side,
+            tallest: plan.tallest,
+        };
+        let mut beyond: Vec<(f64, (i32, i32))> = silhouette_quads(ground, eye, &belt)
             .into_iter()
             .map(|quad| (self.tree_bounds(tree, quad), quad))
             .filter(|(bounds, quad)| bounds.touches(&planes, eye.position) && !visible.contains(quad))
@@ -277,38 +280,4 @@ impl SeedData {
             pass.dispatch([work.fresh.1, 1, 1]);
         });
     }
-}
-
-/// Listed trees quad by quad, in the order of species and lists, and each quad's first and number.
-fn bin_listed(scene: &Scene, side: f64) -> (Vec<ListedTree>, ListedRanges) {
-    let mut all: Vec<((i32, i32), ListedTree)> = Vec::new();
-    for (species, s) in scene.species.iter().enumerate() {
-        let Distribution::Positions(list) = &s.distribution else { continue };
-        for (index, p) in list.iter().enumerate() {
-            // A tree on the far border belongs to the last quad.
-            let quad = [0, 1].map(|k| {
-                let last = (scene.terrain.extent[k] / side).ceil().max(1.0) - 1.0;
-                ([p.x, p.y][k] / side).floor().clamp(0.0, last)
-            });
-            let tree = ListedTree {
-                position: [(p.x - quad[0] * side) as f32, (p.y - quad[1] * side) as f32],
-                scale: p.scale.unwrap_or(0.0),
-                turn: p.rotation.map_or(-1.0, |r| (r / 360.0).rem_euclid(1.0)),
-                species: species as u32,
-                index: index as u32,
-            };
-            all.push(((quad[1] as i32, quad[0] as i32), tree));
-        }
-    }
-    all.sort_by_key(|(quad, _)| *quad);
-    let mut ranges: HashMap<(i32, i32), (u32, u32)> = HashMap::new();
-    for (k, ((y, x), _)) in all.iter().enumerate() {
-        ranges.entry((*x, *y)).or_insert((k as u32, 0)).1 += 1;
-    }
-    (all.into_iter().map(|(_, t)| t).collect(), ranges)
-}
-
-/// Trees of the fullest quad of listed trees.
-pub(crate) fn fullest_listed(scene: &Scene, side: f64) -> u32 {
-    bin_listed(scene, side).1.values().map(|(_, n)| *n).max().unwrap_or(0)
 }

@@ -1,17 +1,16 @@
 //! Species on the GPU: the table, the z-field views of all species in one array, view bases, masks and density maps.
 
-use std::borrow::Cow;
-
-use super::density::{HEIGHT_SOFTNESS, SLOPE_SOFTNESS};
-use super::listed;
-use crate::bake::{Baked, ZField, tables};
+use crate::bake::{Baked, tables};
 use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
+use crate::land::density::{DensityMap, HEIGHT_SOFTNESS, SLOPE_SOFTNESS, density_map};
 use crate::physics::masks::combination_table;
+use crate::physics::raster::Raster;
 use crate::physics::transfer::NEUTRAL;
 use crate::physics::views;
+use crate::physics::zfield::ZField;
 use crate::plan::Plan;
-use crate::scene::{Distribution, Raster, Scene, Species, TreePosition};
+use crate::scene::{Distribution, Scene, Species, TreePosition};
 use crate::{Error, Result};
 
 /// Everything about species that shaders read.
@@ -68,7 +67,7 @@ impl SpeciesData {
         }
         let transfer = [transfer(gpu, plan, baked, 0)?, transfer(gpu, plan, baked, 1)?];
         let bases: Vec<ViewBasis> = baked.iter().flat_map(|b| view_bases(&b.species.views)).collect();
-        let maps: Vec<Option<Map>> =
+        let maps: Vec<Option<DensityMap>> =
             scene.species.iter().map(|s| density_map(s, scene.terrain.extent)).collect();
         let rows = rows(scene, plan, baked, &maps, view_count);
         let maps: Vec<&Raster> = maps.iter().flatten().map(|m| m.relative.as_ref()).collect();
@@ -175,35 +174,6 @@ fn view_bases(field: &ZField) -> Vec<ViewBasis> {
         .collect()
 }
 
-/// A density over the whole terrain.
-struct Map<'a> {
-    /// Relative to its largest value.
-    relative: Cow<'a, Raster>,
-    /// Listed trees per m² where it is 1.
-    listed: f64,
-}
-
-/// The map of a species' density, or of its listed trees; `None`: the same everywhere.
-fn density_map(species: &Species, extent: [f64; 2]) -> Option<Map<'_>> {
-    match &species.distribution {
-        Distribution::Density { map, .. } => {
-            map.as_deref().map(|m| Map { relative: Cow::Borrowed(m), listed: 0.0 })
-        }
-        Distribution::Positions(list) => {
-            let (relative, listed) = listed::density(extent, list);
-            Some(Map { relative: Cow::Owned(relative), listed })
-        }
-    }
-}
-
-/// Texels of the map that a species' density needs.
-pub(crate) fn density_map_size(species: &Species, extent: [f64; 2]) -> Option<[u32; 2]> {
-    match &species.distribution {
-        Distribution::Density { map, .. } => map.as_ref().map(|m| [m.width, m.height]),
-        Distribution::Positions(list) => Some(listed::grid_size(extent, list.len())),
-    }
-}
-
 /// Mean of the squared scale of a species' trees.
 fn mean_squared_scale(species: &Species) -> f64 {
     let drawn = tables::mean_squared_scale(species.scale);
@@ -216,7 +186,13 @@ fn mean_squared_scale(species: &Species) -> f64 {
     }
 }
 
-fn rows(scene: &Scene, plan: &Plan, baked: &[Baked], maps: &[Option<Map>], view_count: u32) -> Vec<Row> {
+fn rows(
+    scene: &Scene,
+    plan: &Plan,
+    baked: &[Baked],
+    maps: &[Option<DensityMap>],
+    view_count: u32,
+) -> Vec<Row> {
     let mut next_map = 0;
     let mut rows = Vec::new();
     for (k, (species, Baked { species: bake, tables })) in scene.species.iter().zip(baked).enumerate() {

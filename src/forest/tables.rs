@@ -3,8 +3,8 @@
 
 use half::f16;
 
-use crate::bake::ForestTables;
 use crate::gpu::{Gpu, Image, ImageDesc, vk};
+use crate::physics::tables::ForestTables;
 use crate::{Error, Result};
 
 /// The tables of every species.

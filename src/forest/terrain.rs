@@ -1,13 +1,12 @@
 //! Terrain tiles: heights and slopes of quads in texture arrays, least recently used first out.
 
 use super::cache::SlotCache;
-use super::quadtree::{MIN_REFINE, QuadKey, Quadtree};
-use crate::frame::camera::Eye;
-use crate::frame::cascades::Cascade;
+use crate::camera::{Cascade, Eye};
 use crate::gpu::interface::{
     NO_PAGE, TERRAIN_CELLS, TERRAIN_HEIGHTS, TERRAIN_SLOPES, TerrainParameters, TerrainQuad,
 };
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Program, Recorder, Resource, Sampler, shaders, vk};
+use crate::land::quadtree::{MIN_REFINE, QuadKey, Quadtree};
 use crate::plan::Plan;
 use crate::scene::{Albedo, Scene};
 use crate::{Error, Result};
@@ -156,7 +155,7 @@ impl TerrainData {
         loop {
             self.refine = refine;
             let tree = &self.tree;
-            let select = |keep: &dyn Fn(&super::quadtree::Bounds) -> bool| {
+            let select = |keep: &dyn Fn(&crate::land::quadtree::Bounds) -> bool| {
                 tree.select(eye.position, refine, most, keep)
             };
             let camera = select(&|b| b.touches(&planes, eye.position));

@@ -1,8 +1,8 @@
 //! The terrain pass.
 
-use super::shader_map::ShaderMap;
 use super::shadows::TerrainPush;
 use super::targets::ImageTargets;
+use super::trees::shader_map::ShaderMap;
 use super::{Forest, NearTrees};
 use crate::Result;
 use crate::forest::coverage;

@@ -1,13 +1,9 @@
 //! A frame: every pass in order, in [`Renderer::render`].
 
-pub mod camera;
-pub mod cascades;
 pub mod ground;
-pub mod shader_map;
 pub mod shadows;
 pub mod sky;
 pub mod targets;
-pub mod tiles;
 pub mod tonemap;
 pub mod trees;
 pub mod view;
@@ -17,6 +13,7 @@ use std::sync::Arc;
 use tracing::info_span;
 
 use crate::bake::Baked;
+use crate::camera::{Cascade, Eye, Light};
 use crate::clock::{monotonic_ns, process_cpu_ms_since, process_cpu_ns};
 use crate::forest::coverage::CoverageData;
 use crate::forest::cull::{CullData, TreeCounts};
@@ -30,17 +27,14 @@ use crate::image::Picture;
 use crate::plan::{Plan, Rasterizer};
 use crate::scene::{Camera, Scene, Sun};
 use crate::{Error, Result};
-use camera::Eye;
-use cascades::Cascade;
 use ground::Ground;
-use shader_map::ShaderMap;
 use shadows::Shadows;
 use sky::SkyPass;
 use targets::ImageTargets;
-use tiles::TreeTiles;
 use tonemap::Tonemap;
-use trees::Trees;
-use view::Light;
+use trees::shader_map::ShaderMap;
+use trees::tiles::TreeTiles;
+use trees::zfield::Trees;
 
 /// What lives between frames for the trees; absent from scenes without.
 pub struct Forest {
@@ -370,7 +364,7 @@ impl Renderer {
     /// [`crate::Error::Device`] if the device fails.
     pub fn picture(&self) -> Result<Picture> {
         let _read = info_span!("read back").entered();
-        Picture::read(&self.gpu, &self.plan, &self.targets, self.light.scale)
+        self.targets.read(&self.gpu, &self.plan, self.light.scale)
     }
 
     /// The device that draws.
@@ -386,26 +380,4 @@ fn shadow_reach(sun: [f64; 3], cascades: u32, tall: f64) -> [f64; 3] {
     }
     let length = tall / sun[2].max(0.05);
     [-sun[0] * length, -sun[1] * length, -sun[2] * length]
-}
-
-/// The exposure at which a level forest floor of 6 % reflectance, under this sun and sky, is drawn at a seventh of the
-/// display's linear range: forests are dark, and snow would be white.
-pub fn auto_exposure(scene: &Scene) -> f64 {
-    let light = Light::new(scene);
-    let luminance = |c: [f64; 3]| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
-    let up = light.direction[2].max(0.2);
-    let radiance = 0.06 / std::f64::consts::PI * (luminance(light.sun) * up) + 0.06 * luminance(light.sky);
-    if radiance > 0.0 { 0.15 / radiance } else { 1.0 }
-}
-
-/// The factor of an exposure in stops.
-///
-/// # Errors
-/// [`crate::Error::Usage`] unless it is a number from -64 to 64.
-pub fn check_exposure(ev: f64) -> Result<f64> {
-    if ev.is_finite() && ev.abs() <= 64.0 {
-        Ok(ev.exp2())
-    } else {
-        Err(crate::Error::Usage(format!("exposure {ev} EV; it takes -64 to 64")))
-    }
 }

@@ -1,8 +1,7 @@
 //! All cascades in one layered pass: the terrain, then the trees' backs (BN12, section 5).
 
-use super::camera::Eye;
-use super::cascades::Cascade;
 use crate::Result;
+use crate::camera::{Cascade, Eye};
 use crate::forest::cull::CullData;
 use crate::forest::seeds::SeedData;
 use crate::forest::species::SpeciesData;
@@ -72,7 +71,11 @@ impl Shadows {
                 program(&shaders::FRAME_TERRAIN_SHADOW_VERT, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[])?,
                 plan.z_fields
                     .then(|| {
-                        program(&shaders::FRAME_TREE_SHADOW_VERT, &shaders::FRAME_TREE_SHADOW_FRAG, &views)
+                        program(
+                            &shaders::FRAME_TREES_ZFIELD_SHADOW_VERT,
+                            &shaders::FRAME_TREES_ZFIELD_SHADOW_FRAG,
+                            &views,
+                        )
                     })
                     .transpose()?,
             )),
@@ -89,7 +92,14 @@ impl Shadows {
         let near = (0.02 * plan.shadow_distance).min(5.0).max(clear);
         let s = &scene.settings;
         let (count, split) = (plan.cascades, f64::from(s.cascade_split));
-        super::cascades::cascades(eye, sun, (clear, near, plan.shadow_distance), count, split, s.cascade_size)
+        crate::camera::cascades::cascades(
+            eye,
+            sun,
+            (clear, near, plan.shadow_distance),
+            count,
+            split,
+            s.cascade_size,
+        )
     }
 
     /// Records the pass.

@@ -1,8 +1,8 @@
 //! The sky behind everything, when it is an image; a uniform sky is a clear colour.
 
 use super::targets::ImageTargets;
-use super::view::Light;
 use crate::Result;
+use crate::camera::Light;
 use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler, Targets,
     shaders, vk,

@@ -1,6 +1,10 @@
 //! What a frame draws to.
 
+use half::f16;
+
+use crate::camera::NEAR_PLANE;
 use crate::gpu::{Attachment, Buffer, Gpu, Image, ImageDesc, vk};
+use crate::image::{Linear, Picture};
 use crate::plan::Plan;
 use crate::{Result, gpu};
 
@@ -89,6 +93,34 @@ impl ImageTargets {
             )?,
             picture: gpu.buffer("picture", pixels * 4)?,
         })
+    }
+
+    /// Reads the frame drawn, with radiances times `scale`, to them.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the device fails.
+    pub fn read(&self, gpu: &Gpu, plan: &Plan, scale: f64) -> Result<Picture> {
+        let pixels = plan.size[0] as usize * plan.size[1] as usize;
+        let words: Vec<u32> = gpu.read(&self.picture, 0, pixels)?;
+        let display = bytemuck::cast_slice(&words).to_vec();
+        let linear = plan.layers.then(|| -> Result<Linear> {
+            let part = |k: usize| gpu.read_image::<[u16; 4]>(&self.colors[k].image, 0, 0);
+            let (sun, sky) = (part(0)?, part(1)?);
+            let rgb =
+                |t: &[u16; 4]| [0, 1, 2].map(|k| (f64::from(f16::from_bits(t[k]).to_f32()) / scale) as f32);
+            let depth = gpu.read_image::<f32>(&self.depth.image, 0, 0)?;
+            Ok(Linear {
+                sun: sun.iter().map(rgb).collect(),
+                sky: sky.iter().map(rgb).collect(),
+                // Reverse Z with an infinite far plane: depth = near / distance.
+                depth: depth.iter().map(|z| if *z > 0.0 { NEAR_PLANE as f32 / z } else { 0.0 }).collect(),
+                coverage: sky.iter().map(|t| f16::from_bits(t[3]).to_f32()).collect(),
+                species: gpu.read_image(&self.colors[2].image, 0, 0)?,
+                fractions: part(3)?.iter().map(|t| t.map(|v| f16::from_bits(v).to_f32())).collect(),
+                noise: None,
+            })
+        });
+        Ok(Picture { size: plan.size, display, linear: linear.transpose()? })
     }
 
     /// Colour attachments with and without layers.

@@ -14,9 +14,9 @@ use super::results::{
 };
 use crate::Result;
 use crate::bake::{Baked, load_or_bake_scene};
+use crate::camera::{Eye, auto_exposure};
 use crate::clock::monotonic_ns;
-use crate::frame::camera::Eye;
-use crate::frame::{FrameReport, Renderer, auto_exposure};
+use crate::frame::{FrameReport, Renderer};
 use crate::gpu::{Gpu, PassTime, TimingOptions};
 use crate::plan::Plan;
 use crate::progress::Progress;

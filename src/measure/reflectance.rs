@@ -12,13 +12,13 @@
 use std::sync::Arc;
 
 use crate::bake::Baked;
+use crate::camera::{Cascade, Eye};
 use crate::frame::Renderer;
-use crate::frame::camera::Eye;
-use crate::frame::cascades::Cascade;
 use crate::gpu::Gpu;
+use crate::physics::raster::Raster;
 use crate::plan::{Plan, Representation};
 use crate::reference::{Options, World};
-use crate::scene::{Camera, Distribution, Raster, Scene, Terrain};
+use crate::scene::{Camera, Distribution, Scene, Terrain};
 use crate::{Error, Result};
 
 /// Distance of the camera from a patch, in sides of the patch: rays diverge by 1.2 degrees.
@@ -100,7 +100,7 @@ pub fn mean_densities(scene: &Scene) -> Vec<f64> {
                 let sum: f64 = (0..(n * n) as usize)
                     .map(|k| {
                         let (x, y) = (at(k % n as usize, width), at(k / n as usize, height));
-                        crate::forest::density::local(&s.distribution, &scene.terrain, x, y)
+                        crate::land::density::local(&s.distribution, &scene.terrain, x, y)
                     })
                     .sum();
                 sum / f64::from(n * n)
@@ -287,7 +287,7 @@ fn shown(view: [f64; 2], slope: f64, side: f64) -> f64 {
 /// The viewer of a patch.
 fn eye(terrain: &Terrain, view: [f64; 2], centre: [f64; 2], away: f64, m: &Method, pixels_at_1m: f64) -> Eye {
     let v = direction(view);
-    let ground = crate::physics::terrain::height_at(terrain, centre[0], centre[1]);
+    let ground = terrain.height_at(centre[0], centre[1]);
     let target = [centre[0], centre[1], ground];
     let position = std::array::from_fn(|k| target[k] + away * v[k]);
     let fov = 2.0 * (0.5 * m.side / away).atan().to_degrees();
@@ -299,7 +299,7 @@ fn eye(terrain: &Terrain, view: [f64; 2], centre: [f64; 2], away: f64, m: &Metho
 fn shadow_texel(scene: &Scene, plan: &Plan, eye: &Eye, distance: f64) -> f64 {
     use crate::frame::shadows::Shadows;
     let cascades =
-        Shadows::cascades(scene, plan, eye, crate::frame::view::sun_direction(&scene.sun), eye.position[2]);
+        Shadows::cascades(scene, plan, eye, crate::camera::sun_direction(&scene.sun), eye.position[2]);
     cascades.iter().find(|c| distance <= c.far).or(cascades.last()).map_or(1.0, |c| c.texel)
 }
 
@@ -307,7 +307,7 @@ fn shadow_texel(scene: &Scene, plan: &Plan, eye: &Eye, distance: f64) -> f64 {
 fn cascade(scene: &Scene, eye: &Eye, away: f64, texel: f64) -> Cascade {
     let half = 0.5 * texel * f64::from(scene.settings.cascade_size);
     let target = std::array::from_fn(|k| away * eye.forward[k]);
-    Cascade::around(crate::frame::view::sun_direction(&scene.sun), eye, target, half, texel, 2.0 * away)
+    Cascade::around(crate::camera::sun_direction(&scene.sun), eye, target, half, texel, 2.0 * away)
 }
 
 /// Mean of an image: fractions, sun and sky part.

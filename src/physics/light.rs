@@ -11,7 +11,7 @@ pub fn angle_between(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Reflectance of a crown at a phase angle, rad, over that at 0: seen from beside the light, more of its leaves show their unlit
-/// side than uniform ones would ([`crate::bake::Turned`]).
+/// side than uniform ones would (`Turned` of a bake).
 pub fn turned_reflectance(turning: f64, angle: f64) -> f64 {
     (1.0 + turning * angle).max(0.0)
 }

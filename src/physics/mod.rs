@@ -4,6 +4,7 @@ pub mod handover;
 pub mod hash;
 pub mod light;
 pub mod masks;
+pub mod raster;
 pub mod shadow;
 pub mod tables;
 pub mod terrain;

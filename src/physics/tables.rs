@@ -52,10 +52,40 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use crate::bake::tables::ForestTables;
-
 /// Largest zenith angle of a node, rad: 88°.
 pub const THETA_MAX: f64 = 88.0 * PI / 180.0;
+
+/// The measured tables.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForestTables {
+    /// Nodes n of each angle.
+    pub angles: u32,
+    /// Nodes m of the density.
+    pub densities: u32,
+    /// Largest x = λA.
+    pub max_thickness: f32,
+    /// Mean horizontal tree area A, m².
+    pub area: f32,
+    /// k of S = diag(1, 1, k).
+    pub vertical_scale: f32,
+    /// 1/r² of the hole around a tree, over the density (BN12, eq. 9).
+    pub hole: f32,
+    /// Factor of the sky's light on a crown that is seen from the side, and its change with the cosine of the view's zenith
+    /// angle.
+    pub sky: [f32; 2],
+    /// (W, T_leaf, T_bark, M).
+    pub pair: Vec<[f32; 4]>,
+    /// Standard errors of (k_g, T_leaf, T_bark, M).
+    pub pair_stderr: Vec<[f32; 4]>,
+    /// (V, E_leaf, E_bark, Γ_v).
+    pub view: Vec<[f32; 4]>,
+    /// Standard errors of (P, E_leaf, E_bark, Γ_v).
+    pub view_stderr: Vec<[f32; 4]>,
+    /// (D, C).
+    pub ground: Vec<[f32; 2]>,
+    /// Standard errors of (D, C).
+    pub ground_stderr: Vec<[f32; 2]>,
+}
 
 /// Node i of the zenith angle of the view, rad.
 pub fn zenith_node(n: usize, i: usize) -> f64 {

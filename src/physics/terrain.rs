@@ -1,7 +1,7 @@
 //! The ground between the samples of a height map: bicubic Catmull-Rom interpolation; twin of
 //! `shaders/physics/terrain.glsl`. Interpolates the samples, continuous with its slope.
 
-use crate::scene::{Raster, Terrain};
+use super::raster::Raster;
 
 fn weights(f: f64) -> [f64; 4] {
     [
@@ -36,14 +36,6 @@ pub fn height_and_slope(raster: &Raster, x: f64, y: f64) -> [f64; 3] {
         sum[2] += dy[j] * height;
     }
     sum
-}
-
-/// Height of the ground at a position in metres from the south-west corner; outside, that of the nearest border.
-pub fn height_at(terrain: &Terrain, x: f64, y: f64) -> f64 {
-    terrain.heights.as_ref().map_or(0.0, |raster| {
-        let limit = |v: f64, n: u32| (v / terrain.cell_size).clamp(0.0, f64::from(n - 1));
-        height_and_slope(raster, limit(x, raster.width), limit(y, raster.height))[0]
-    })
 }
 
 #[cfg(test)]

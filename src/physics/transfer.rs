@@ -21,6 +21,15 @@ pub const ZERO: f64 = 128.0;
 /// The bytes that change nothing: M = 1.
 pub const NEUTRAL: [u8; TERMS] = [128; TERMS];
 
+/// Light transfer of the views of a z-field: a texture array like its own, but smaller.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Transfer {
+    /// Texels a side of level 0: half of the views'.
+    pub resolution: u32,
+    /// Per band and level, all layers one after the other, rows from the bottom (v = 0) up: coefficients of each texel, encoded.
+    pub bands: Vec<Vec<Vec<u8>>>,
+}
+
 /// w: how much of transfer there is at a phase angle, rad.
 pub fn reach(angle: f64) -> f64 {
     1.0 - (-angle.sqrt()).exp()

@@ -5,7 +5,18 @@
 use glam::DVec3;
 
 use super::views::{self, Basis, Lookup};
-use crate::bake::ZField;
+
+/// Depth views of one tree: a texture array with one layer a view and mip levels down to 1 × 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ZField {
+    /// n of the 2n(n+1)+1 views.
+    pub n: u32,
+    /// Texels a side of level 0; a power of two.
+    pub resolution: u32,
+    /// Per level, all layers one after the other, rows from the bottom (v = 0) up, RGBA8:
+    /// premultiplied nearest depth, farthest depth, occlusion; opacity.
+    pub levels: Vec<Vec<u8>>,
+}
 
 /// A texel, decoded: everything premultiplied by the opacity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -2,22 +2,13 @@
 
 use std::collections::HashSet;
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3};
 
-use super::hierarchy::{Hierarchy, Stack};
 use crate::Result;
 use crate::bake::optics::{Colours, colours};
-use crate::bake::surface::{Face, Surface};
+use crate::bake::surface::Surface;
+use crate::rays::{Met, Stack, Triangles};
 use crate::scene::Species;
-
-/// Four triangles: a corner and two edges each. A triangle that is not there has no edges, and is never hit.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(16))]
-struct Pack {
-    corner: [Vec4; 3],
-    edges: [[Vec4; 3]; 2],
-    faces: [u32; 4],
-}
 
 /// A species: its mesh in a hierarchy, and its reflectances.
 #[derive(Clone, Debug)]
@@ -27,23 +18,11 @@ pub struct Foliage {
     normals: Vec<Vec3>,
     /// Whether each material is leaves.
     leaves: Vec<bool>,
-    packs: Vec<Pack>,
-    hierarchy: Hierarchy,
+    triangles: Triangles,
     /// Reflectances, as the renderer has them.
     pub colours: Colours,
     /// Convex hull of the mesh as seen from above, m.
     hull: Vec<Vec2>,
-}
-
-/// Where a ray meets a tree, in the tree's own metres.
-#[derive(Clone, Copy, Debug)]
-pub struct Met {
-    /// Index of the face.
-    pub face: u32,
-    /// Parameter along the ray.
-    pub t: f32,
-    /// Barycentric coordinates of the second and third corner.
-    pub at: [f32; 2],
 }
 
 impl Foliage {
@@ -64,19 +43,11 @@ impl Foliage {
         });
         let corners: Vec<[Vec3; 3]> =
             surface.faces.iter().map(|f| f.p.map(|p| surface.frame.to_metres(p))).collect();
-        let boxes: Vec<(Vec3, Vec3)> =
-            corners.iter().map(|[a, b, c]| (a.min(*b).min(*c), a.max(*b).max(*c))).collect();
-        let mut packs = Vec::new();
-        let hierarchy = Hierarchy::new(&boxes, 4, |faces| {
-            packs.push(Pack::new(&corners, faces));
-            packs.len() as u32 - 1
-        });
         Ok(Foliage {
             normals: corners.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).normalize_or(Vec3::Z)).collect(),
             leaves: mesh.materials.iter().map(|m| m.foliage).collect(),
             surface,
-            packs,
-            hierarchy,
+            triangles: Triangles::new(&corners),
             colours,
             hull: hull(corners.iter().flatten().map(|p| p.truncate()).collect()),
         })
@@ -84,7 +55,8 @@ impl Foliage {
 
     /// Farthest coordinate of the mesh from the trunk's base, m.
     pub fn reach(&self) -> f32 {
-        self.hierarchy.low.abs().max(self.hierarchy.high.abs()).max_element()
+        let (low, high) = self.triangles.bounds();
+        low.abs().max(high.abs()).max_element()
     }
 
     /// Number of triangles.
@@ -99,37 +71,20 @@ impl Foliage {
             let turned = Vec2::new(c * p.x - s * p.y, s * p.x + c * p.y);
             (low, high) = (low.min(turned), high.max(turned));
         }
-        (low.extend(self.hierarchy.low.z), high.extend(self.hierarchy.high.z))
+        let (lowest, highest) = self.triangles.bounds();
+        (low.extend(lowest.z), high.extend(highest.z))
     }
 
     /// The nearest surface along a ray between 0 and `t_max`.
     pub fn nearest(&self, origin: Vec3, direction: Vec3, t_max: f32, stack: &mut Stack) -> Option<Met> {
-        let mut met = None;
-        self.hierarchy.walk(origin, direction, t_max, stack, |_, pack, mut t_max| {
-            let pack = &self.packs[pack as usize];
-            if let Some((hit, t, u, v)) = pack.hits(origin, direction, t_max) {
-                for lane in (0..4).filter(|k| hit >> k & 1 != 0) {
-                    if t[lane] < t_max && self.opaque(pack.faces[lane], u[lane], v[lane]) {
-                        t_max = t[lane];
-                        met = Some(Met { face: pack.faces[lane], t: t_max, at: [u[lane], v[lane]] });
-                    }
-                }
-            }
-            t_max
-        });
-        met
+        let opaque = |face, u, v| self.surface.is_at(face, u, v);
+        self.triangles.nearest(origin, direction, t_max, stack, opaque)
     }
 
     /// Whether any surface is on a ray beyond 0.
     pub fn occludes(&self, origin: Vec3, direction: Vec3, stack: &mut Stack) -> bool {
-        let end = self.hierarchy.walk(origin, direction, f32::MAX, stack, |_, pack, t_max| {
-            let pack = &self.packs[pack as usize];
-            let found = pack.hits(origin, direction, t_max).is_some_and(|(hit, _, u, v)| {
-                (0..4).any(|k| hit >> k & 1 != 0 && self.opaque(pack.faces[k], u[k], v[k]))
-            });
-            if found { -1.0 } else { t_max }
-        });
-        end < 0.0
+        let opaque = |face, u, v| self.surface.is_at(face, u, v);
+        self.triangles.occluded(origin, direction, 0.0, stack, opaque)
     }
 
     /// Unit normal of a face.
@@ -146,11 +101,6 @@ impl Foliage {
     pub fn point(&self, met: &Met) -> Vec3 {
         let [a, b, c] = self.surface.faces[met.face as usize].p.map(|p| self.surface.frame.to_metres(p));
         a + (b - a) * met.at[0] + (c - a) * met.at[1]
-    }
-
-    fn opaque(&self, face: u32, u: f32, v: f32) -> bool {
-        let f: &Face = &self.surface.faces[face as usize];
-        f.mask.is_none() || self.surface.opaque(f, f.uv[0] * (1.0 - u - v) + f.uv[1] * u + f.uv[2] * v)
     }
 }
 
@@ -173,37 +123,4 @@ fn hull(mut points: Vec<Vec2>) -> Vec<Vec2> {
     let mut all = chain(&mut points.iter());
     all.extend(chain(&mut points.iter().rev()));
     all
-}
-
-impl Pack {
-    fn new(corners: &[[Vec3; 3]], faces: &[u32]) -> Self {
-        let lanes = |f: &dyn Fn(&[Vec3; 3]) -> f32| {
-            Vec4::from_array(std::array::from_fn(|k| faces.get(k).map_or(0.0, |i| f(&corners[*i as usize]))))
-        };
-        Pack {
-            corner: [0, 1, 2].map(|k| lanes(&|c| c[0][k])),
-            edges: [1, 2].map(|e| [0, 1, 2].map(|k| lanes(&|c| c[e][k] - c[0][k]))),
-            faces: std::array::from_fn(|k| faces.get(k).copied().unwrap_or(0)),
-        }
-    }
-
-    /// Möller and Trumbore's intersection: which of the four are hit between 0 and `t_max`, where, and the barycentric
-    /// coordinates. Comparisons with NaN, of triangles seen from their edge, are false.
-    #[inline]
-    #[allow(clippy::type_complexity)]
-    fn hits(&self, o: Vec3, d: Vec3, t_max: f32) -> Option<(u32, [f32; 4], [f32; 4], [f32; 4])> {
-        let (dx, dy, dz) = (Vec4::splat(d.x), Vec4::splat(d.y), Vec4::splat(d.z));
-        let [[ax, ay, az], [bx, by, bz]] = self.edges;
-        let (px, py, pz) = (dy * bz - dz * by, dz * bx - dx * bz, dx * by - dy * bx);
-        let inverse = (ax * px + ay * py + az * pz).recip();
-        let [cx, cy, cz] = self.corner;
-        let (sx, sy, sz) = (Vec4::splat(o.x) - cx, Vec4::splat(o.y) - cy, Vec4::splat(o.z) - cz);
-        let u = (sx * px + sy * py + sz * pz) * inverse;
-        let (qx, qy, qz) = (sy * az - sz * ay, sz * ax - sx * az, sx * ay - sy * ax);
-        let v = (dx * qx + dy * qy + dz * qz) * inverse;
-        let t = (bx * qx + by * qy + bz * qz) * inverse;
-        let inside = u.cmpge(Vec4::ZERO) & v.cmpge(Vec4::ZERO) & (u + v).cmple(Vec4::ONE);
-        let hit = (inside & t.cmpgt(Vec4::ZERO) & t.cmplt(Vec4::splat(t_max))).bitmask();
-        (hit != 0).then(|| (hit, t.to_array(), u.to_array(), v.to_array()))
-    }
 }

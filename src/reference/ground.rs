@@ -10,10 +10,11 @@ use std::sync::OnceLock;
 
 use glam::{DVec2, DVec3};
 
-use crate::forest::quadtree::Quadtree;
+use crate::land::quadtree::Quadtree;
+use crate::physics::raster::Raster;
 use crate::physics::terrain::height_and_slope;
 use crate::physics::tonemap::linear;
-use crate::scene::{Albedo, Raster, Terrain};
+use crate::scene::{Albedo, Terrain};
 
 /// Grid cells along a block: the unit that is skipped within a tile.
 const BLOCK: usize = 8;
@@ -312,7 +313,6 @@ fn walk<T>(
 mod tests {
     use super::*;
     use crate::physics::hash::Stream;
-    use crate::physics::terrain::height_at;
 
     fn hills() -> Terrain {
         let (width, height) = (41, 30);
@@ -348,7 +348,7 @@ mod tests {
                 d.y = 0.0;
             }
             let d = d.normalize_or(-DVec3::Z);
-            let o = DVec3::new(x, y, height_at(&terrain, x, y) + 0.5 + 80.0 * random.unit());
+            let o = DVec3::new(x, y, terrain.height_at(x, y) + 0.5 + 80.0 * random.unit());
             // Steps of a quarter of a metre against the smooth surface.
             let inside = |p: DVec3| {
                 (0.0..=terrain.extent[0]).contains(&p.x) && (0.0..=terrain.extent[1]).contains(&p.y)
@@ -359,7 +359,7 @@ mod tests {
                 if !inside(p) || p.z > 70.0 && d.z >= 0.0 {
                     break;
                 }
-                if p.z < height_at(&terrain, p.x, p.y) {
+                if p.z < terrain.height_at(p.x, p.y) {
                     marched = Some(0.25 * f64::from(step));
                     break;
                 }
@@ -371,7 +371,7 @@ mod tests {
                     let p = o + d * b;
                     // Triangles with a diagonal of 4.4 m under a curvature of 60 · (0.7² + 0.5²)/25² /m: 4.4²/8 of it is
                     // 17 cm, and the cubic's may be half as much again.
-                    let off = p.z - height_at(&terrain, p.x, p.y);
+                    let off = p.z - terrain.height_at(p.x, p.y);
                     assert!(off.abs() < 0.25, "ray {k}: {off} m from the ground");
                     // It meets the same slope, but where it grazes a crest that the triangles cut off.
                     assert!((a - b).abs() < 0.3 + 0.25 / d.dot(n).abs().max(1e-3), "ray {k}: {a} {b}");
@@ -394,7 +394,7 @@ mod tests {
                     let least = (0..400)
                         .map(|k| o + d * (t + 0.25 * f64::from(k)))
                         .filter(|p| inside(*p))
-                        .map(|p| p.z - height_at(&terrain, p.x, p.y))
+                        .map(|p| p.z - terrain.height_at(p.x, p.y))
                         .fold(f64::INFINITY, f64::min);
                     assert!(least > -0.25, "ray {k}: {a:?} {b:?}, {least} m under the ground");
                 }

@@ -4,7 +4,7 @@ use bytemuck::NoUninit;
 
 use super::Options;
 use super::trees::Tree;
-use crate::frame::camera::Eye;
+use crate::camera::Eye;
 use crate::scene::{Albedo, Distribution, Scene, Sky};
 
 /// Raised when the same scene gives other samples than before.

@@ -35,14 +35,14 @@
 //!
 //! # Where trees come from
 //!
-//! From [`crate::forest::candidate`], the twin of the shader that makes the renderer's seeds: the same places, species,
+//! From [`crate::land::candidate`], the twin of the shader that makes the renderer's seeds: the same places, species,
 //! rotations, scales and tints. At distances where the renderer draws a shader-map the reference still has the trees. Only
 //! those are made that the eye may see, or that shade or light what it sees: trees within six heights of the tallest, and
 //! those whose shadows reach it.
 //!
 //! ```no_run
 //! # fn main() -> canopy::Result<()> {
-//! use canopy::frame::camera::Eye;
+//! use canopy::camera::Eye;
 //! use canopy::reference::{Options, Until, World};
 //!
 //! let scene = canopy::scene::load("ridge.toml".as_ref())?;
@@ -50,7 +50,7 @@
 //! let world = World::new(&scene, &[eye])?;
 //! let options = Options { until: Until::Error(0.02), ..Options::default() };
 //! let estimate = world.render(&eye, &options, None, &mut |p| println!("{:.0} %", 100.0 * p.done))?;
-//! estimate.picture(canopy::frame::auto_exposure(&scene)).write_png("truth.png".as_ref())
+//! estimate.picture(canopy::camera::auto_exposure(&scene)).write_png("truth.png".as_ref())
 //! # }
 //! ```
 
@@ -58,7 +58,6 @@ mod estimate;
 mod file;
 mod foliage;
 mod ground;
-mod hierarchy;
 mod key;
 mod path;
 mod render;

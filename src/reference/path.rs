@@ -4,10 +4,10 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{DVec3, Vec3};
 
-use super::hierarchy::Stack;
 use super::sampling::Random;
 use super::world::{Hit, World};
 use super::{Light, Options};
+use crate::rays::Stack;
 
 /// Surfaces before Russian roulette begins.
 const SURE: u32 = 3;

@@ -6,12 +6,12 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::estimate::{Estimate, Sums};
-use super::hierarchy::Stack;
 use super::key::Key;
 use super::sampling::Random;
 use super::world::World;
 use super::{Options, Until};
-use crate::frame::camera::{Eye, NEAR_PLANE};
+use crate::camera::{Eye, NEAR_PLANE};
+use crate::rays::Stack;
 use crate::{Error, Result};
 
 /// Pixels a piece of work.

@@ -6,12 +6,11 @@ use glam::{DVec3, Vec3};
 
 use super::foliage::Foliage;
 use super::ground::Ground;
-use super::hierarchy::{Hierarchy, Stack};
 use super::key::Key;
 use super::trees::{self, Tree};
 use crate::Result;
-use crate::frame::camera::Eye;
-use crate::frame::view;
+use crate::camera::{Eye, Light};
+use crate::rays::{Hierarchy, Stack};
 use crate::scene::{Scene, Sky};
 
 /// Rays leave a tree's surface at this part of the tree's size, against meeting it again.
@@ -29,7 +28,7 @@ pub struct World {
     trees: Vec<Tree>,
     top: Hierarchy,
     origin: DVec3,
-    pub(super) light: view::Light,
+    pub(super) light: Light,
     pub(super) sky: SkyLight,
     pub(super) key: Key,
 }
@@ -61,7 +60,7 @@ impl World {
     /// # Errors
     /// [`crate::Error::Usage`] when that takes more than [`trees::MOST_TREES`] trees, or for a mesh without extent.
     pub fn new(scene: &Scene, eyes: &[Eye]) -> Result<Self> {
-        let light = view::Light::new(scene);
+        let light = Light::new(scene);
         let (trees, origin) = trees::collect(scene, eyes, light.direction)?;
         let species = scene.species.iter().map(Foliage::new).collect::<Result<Vec<_>>>()?;
         let boxes: Vec<(Vec3, Vec3)> = trees.iter().map(|t| t.bounds(&species[t.species as usize])).collect();

@@ -16,6 +16,8 @@ pub mod texture;
 use std::sync::Arc;
 
 use crate::physics::light::sun_disc_fraction;
+use crate::physics::raster::Raster;
+use crate::physics::terrain::height_and_slope;
 use crate::settings::{Settings, nearest};
 use crate::{Error, Result};
 pub use file::{default_scene, load, load_at, parse};
@@ -60,17 +62,6 @@ impl Scene {
     }
 }
 
-/// A raster of 32-bit floats; row 0 is **south**, so that row and y grow together.
-#[derive(Clone, Debug)]
-pub struct Raster {
-    /// Samples west to east.
-    pub width: u32,
-    /// Samples south to north.
-    pub height: u32,
-    /// `width * height` samples, row by row from the south-west corner.
-    pub samples: Vec<f32>,
-}
-
 /// The ground.
 #[derive(Clone, Debug)]
 pub struct Terrain {
@@ -84,6 +75,16 @@ pub struct Terrain {
     pub heights: Option<Raster>,
     /// Lambertian reflectance.
     pub albedo: Albedo,
+}
+
+impl Terrain {
+    /// Height of the ground at a position in metres from the south-west corner; outside, that of the nearest border.
+    pub fn height_at(&self, x: f64, y: f64) -> f64 {
+        self.heights.as_ref().map_or(0.0, |raster| {
+            let limit = |v: f64, n: u32| (v / self.cell_size).clamp(0.0, f64::from(n - 1));
+            height_and_slope(raster, limit(x, raster.width), limit(y, raster.height))[0]
+        })
+    }
 }
 
 /// Ground reflectance.

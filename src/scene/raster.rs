@@ -9,8 +9,8 @@ use image::ImageDecoder;
 use tiff::decoder::DecodingResult;
 use tiff::tags::Tag;
 
-use super::Raster;
 use super::input::{check_content, read_bytes};
+use crate::physics::raster::Raster;
 use crate::{Error, Result};
 
 /// Most samples along a side of a raster.

@@ -3,7 +3,7 @@
 //! A ridged multifractal (Musgrave, in Ebert et al., "Texturing and Modeling", 2003, ch. 16) of gradient noise on an
 //! integer-hashed lattice: each octave is `(1 - a|n|)²`, weighted by the octave before, so that detail gathers on crests.
 
-use super::Raster;
+use crate::physics::raster::Raster;
 
 /// Samples a side.
 pub const SAMPLES: u32 = 401;

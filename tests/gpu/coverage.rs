@@ -2,12 +2,13 @@
 
 use crate::device::{self, Worst};
 use crate::seeds::{SIZE, above, hills, plain, positions, seeds};
-use canopy::forest::quadtree::{MIN_REFINE, QuadKey, Quadtree};
 use canopy::frame::{FrameReport, Renderer};
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::{COVER_GUTTER, Seed, TERRAIN_CELLS, TerrainQuad};
+use canopy::land::quadtree::{MIN_REFINE, QuadKey, Quadtree};
+use canopy::physics::raster::Raster;
 use canopy::plan::Plan;
-use canopy::scene::{Camera, Distribution, Raster, Scene, TreePosition};
+use canopy::scene::{Camera, Distribution, Scene, TreePosition};
 use half::f16;
 use std::collections::BTreeMap;
 use std::sync::Arc;

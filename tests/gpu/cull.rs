@@ -1,15 +1,16 @@
 //! The culled set and its order, exactly those of the CPU.
 
 use crate::device;
+use canopy::camera::Eye;
 use canopy::forest::cull::{CLASS_CAMERA, CLASS_CASCADE, bin_end, classify, tree_centre};
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::{
     CAMERA_DRAWS, CULL_GROUP, DISTANCE_BINS, DrawCommand, MAX_CASCADES, TREE_LISTS, Tree, View,
 };
+use canopy::physics::raster::Raster;
 use canopy::plan::Plan;
-use canopy::scene::{Camera, Distribution, Raster, Scene, TreePosition};
+use canopy::scene::{Camera, Distribution, Scene, TreePosition};
 use std::sync::Arc;
 
 /// Hills of 900 m with a dense species and a listed one.

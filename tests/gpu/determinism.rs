@@ -2,7 +2,8 @@
 
 use crate::device;
 use canopy::image::Picture;
-use canopy::scene::{Raster, Scene};
+use canopy::physics::raster::Raster;
+use canopy::scene::Scene;
 use std::path::Path;
 use std::process::Command;
 

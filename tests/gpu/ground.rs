@@ -2,8 +2,8 @@
 
 use crate::device::{self, Worst, dispatch};
 use canopy::gpu::{ImageDesc, Resource, Sampler, shaders, vk};
+use canopy::physics::raster::Raster;
 use canopy::physics::terrain::height_and_slope;
-use canopy::scene::Raster;
 
 #[test]
 fn heights_and_slopes_are_those_of_the_oracle() {

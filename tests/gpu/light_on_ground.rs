@@ -1,10 +1,11 @@
 //! Ground, sky and shadows of whole frames, where the answer is known in closed form.
 
 use crate::device::{self, Worst};
-use canopy::frame::camera::Eye;
+use canopy::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::image::Linear;
-use canopy::scene::{Camera, Distribution, Raster, Scene, Sky, TreePosition};
+use canopy::physics::raster::Raster;
+use canopy::scene::{Camera, Distribution, Scene, Sky, TreePosition};
 use std::f64::consts::PI;
 use std::sync::Arc;
 

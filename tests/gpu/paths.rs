@@ -126,7 +126,7 @@ fn the_camera_rises_without_a_jump() {
 fn the_view_passes_the_light_without_a_jump() {
     let gpu = device::open();
     let scene = scene();
-    let light = glam::DVec3::from(canopy::frame::view::sun_direction(&scene.sun));
+    let light = glam::DVec3::from(canopy::camera::sun_direction(&scene.sun));
     let across = light.cross(glam::DVec3::Z).normalize();
     // With the light, from above; and against it, from the ground.
     for (path, distance, target) in [("hotspot", 100.0, 0.0), ("against the light", -11.0, 10.0)] {

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use crate::device;
 use canopy::Error;
+use canopy::camera::Eye;
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::image::{Linear, Picture};
+use canopy::physics::raster::Raster;
 use canopy::plan::{Plan, Representation};
-use canopy::scene::{Camera, Distribution, Raster, Scene};
+use canopy::scene::{Camera, Distribution, Scene};
 
 const SIZE: [u32; 2] = [64, 48];
 
@@ -114,7 +115,7 @@ fn without_a_sun_there_are_no_shadows() {
         scene.sun.irradiance = [irradiance; 3];
         let night = draw(&gpu, &scene);
         assert!(!night.has("shadow cascades") && !night.draws("shadows"));
-        for shader in ["frame/terrain_shadow.frag", "frame/tree_shadow.frag"] {
+        for shader in ["frame/terrain_shadow.frag", "frame/trees/zfield_shadow.frag"] {
             assert!(day.builds(shader) && !night.builds(shader), "{shader}: {:?}", night.pipelines);
         }
         // One texel stands for the map that nobody reads.
@@ -154,7 +155,7 @@ fn without_trees_there_is_no_forest() {
     for bare in [thinned, draw(&gpu, &scene)] {
         assert!(!tree_passes.iter().any(|p| bare.draws(p)), "{:?}", bare.passes);
         assert!(!tree_items.iter().any(|p| bare.has(p)), "{:?}", bare.items);
-        for shader in ["forest/", "frame/tree", "frame/shader_map"] {
+        for shader in ["forest/", "frame/trees/zfield", "frame/trees/shader_map"] {
             let tiles = |p: &&str| !p.starts_with("forest/terrain") && p.starts_with(shader);
             assert!(forest.pipelines.iter().any(tiles), "{:?}", forest.pipelines);
             assert!(!bare.pipelines.iter().any(tiles), "{:?}", bare.pipelines);
@@ -190,7 +191,7 @@ fn a_listed_forest_needs_no_pattern_and_a_plain_no_height_map() {
     assert!(!listed.has("point pattern") && listed.draws("seeds"));
     assert!(listed.has("density maps"), "how densely listed trees stand");
     let (width, height) = (11, 11);
-    scene.terrain.heights = Some(canopy::scene::Raster { width, height, samples: vec![1.0; 121] });
+    scene.terrain.heights = Some(canopy::physics::raster::Raster { width, height, samples: vec![1.0; 121] });
     scene.terrain.cell_size = 30.0;
     assert!(draw(&gpu, &scene).has("height map"));
     gpu.close().unwrap();
@@ -306,7 +307,7 @@ fn from_afar_no_tree_is_drawn_by_itself() {
         for pass in ["seeds", "cull", "prefix sums", "draw commands", "compact", "trees"] {
             assert!(with.draws(pass) && !without.draws(pass), "{pass}");
         }
-        for shader in ["forest/cull.comp", "forest/scan.comp", "forest/compact.comp", "frame/tree"] {
+        for shader in ["forest/cull.comp", "forest/scan.comp", "forest/compact.comp", "frame/trees/zfield"] {
             assert!(with.builds(shader) && !without.builds(shader), "{shader}: {:?}", without.pipelines);
         }
         for item in ["coverage tiles", "shader-map nodes", "view tables of a", "pair tables of a"] {

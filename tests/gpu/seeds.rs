@@ -1,15 +1,16 @@
 //! Seeds as the device produces them: where, how many, always the same.
 
 use crate::device::{self, Worst};
-use canopy::forest::candidate::{Layout, listed};
+use canopy::camera::Eye;
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::{DrawCommand, Seed};
+use canopy::land::candidate::{Layout, listed};
 use canopy::physics::hash::{hash, unit};
-use canopy::physics::terrain::{height_and_slope, height_at};
+use canopy::physics::raster::Raster;
+use canopy::physics::terrain::height_and_slope;
 use canopy::plan::Plan;
-use canopy::scene::{Camera, Distribution, Raster, Scene, TreePosition};
+use canopy::scene::{Camera, Distribution, Scene, TreePosition};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
@@ -377,7 +378,7 @@ fn listed_trees_stand_where_the_list_says() {
                 // A step of 1/65536, cut; and the degrees as single.
                 assert!(!(1e-6..=1.0 - 1.1 / 65536.0).contains(&off), "{degrees}: {turn}");
             }
-            let want = height_at(&scene.terrain, tree.x, tree.y);
+            let want = scene.terrain.height_at(tree.x, tree.y);
             assert!((f64::from(s.ground) - want).abs() < 1e-3, "{tree:?}: ground at {} {want}", s.ground);
         }
     }

@@ -1,17 +1,17 @@
 //! Far forests in whole frames: fractions and radiances against the tables in f64, the hand-over, and extremes.
 
 use crate::device::{self, Worst};
-use canopy::bake::ForestTables;
+use canopy::camera::{Eye, sun_direction};
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
-use canopy::frame::view::sun_direction;
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::Species;
 use canopy::image::Linear;
 use canopy::measure::reflectance::{Method, Request, measure};
+use canopy::physics::raster::Raster;
+use canopy::physics::tables::ForestTables;
 use canopy::physics::{light, tables};
 use canopy::plan::{Plan, Representation};
-use canopy::scene::{Distribution, Raster, Scene, TreePosition};
+use canopy::scene::{Distribution, Scene, TreePosition};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -50,7 +50,7 @@ fn eye(scene: &Scene, (zenith, azimuth): (f64, f64), distance: f64, width: f64) 
     let (z, a) = (zenith.to_radians(), azimuth.to_radians());
     let v = [z.sin() * a.sin(), -z.sin() * a.cos(), z.cos()];
     let middle = 0.5 * EXTENT;
-    let ground = canopy::physics::terrain::height_at(&scene.terrain, middle, middle);
+    let ground = scene.terrain.height_at(middle, middle);
     let target = [middle, middle, ground];
     let fov = 2.0 * (0.5 * width / distance).atan().to_degrees();
     Eye::looking([0, 1, 2].map(|k| target[k] + distance * v[k]), v.map(|c| -c), fov, SIZE)

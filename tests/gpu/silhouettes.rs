@@ -3,15 +3,15 @@
 use std::collections::HashMap;
 
 use crate::device;
+use canopy::camera::Eye;
 use canopy::forest::cull::{CLASS_CAMERA, classify, tree_centre};
-use canopy::forest::silhouette::clearance;
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::{DrawCommand, Seed, SeedQuad, Tree, View};
-use canopy::physics::terrain::height_at;
+use canopy::land::silhouette::clearance;
+use canopy::physics::raster::Raster;
 use canopy::plan::Plan;
-use canopy::scene::{Camera, Distribution, Raster, Scene};
+use canopy::scene::{Camera, Distribution, Scene};
 
 const SIZE: [u32; 2] = [320, 240];
 /// Samples a side of the terrain, and metres between them.
@@ -187,7 +187,7 @@ fn hidden(scene: &Scene, eye: &Eye, centre: [f32; 3], height: f64) -> bool {
     let [x, y, z] = centre.map(f64::from);
     (1..2000).any(|k| {
         let s = f64::from(k) / 2000.0;
-        let ground = height_at(&scene.terrain, eye.position[0] + s * x, eye.position[1] + s * y);
+        let ground = scene.terrain.height_at(eye.position[0] + s * x, eye.position[1] + s * y);
         eye.position[2] + s * (z + 0.5 * height) < ground
     })
 }

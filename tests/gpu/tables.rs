@@ -1,11 +1,11 @@
 //! Angles, coordinates and lookups of the forest tables, against their twin in f64.
 
 use crate::device::{self, Arguments, Function, Worst, dispatch, evaluate, float, words};
-use canopy::bake::ForestTables;
 use canopy::forest::tables::TableData;
 use canopy::gpu::{Resource, Sampler, shaders};
 use canopy::physics::hash::Stream;
 use canopy::physics::tables;
+use canopy::physics::tables::ForestTables;
 use glam::DVec3;
 use std::f64::consts::PI;
 

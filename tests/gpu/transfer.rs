@@ -5,8 +5,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use canopy::bake::load_or_bake_scene;
+use canopy::camera::Eye;
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::plan::Plan;
 use canopy::reference::{Light, Options, Until, World};

@@ -2,7 +2,7 @@
 
 use crate::device;
 use canopy::bake::SpeciesBake;
-use canopy::frame::camera::Eye;
+use canopy::camera::Eye;
 use canopy::gpu::Gpu;
 use canopy::image::Linear;
 use canopy::scene::{Camera, Distribution, Scene, TreePosition};

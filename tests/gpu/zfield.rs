@@ -6,11 +6,11 @@
 //! where nothing but a view of almost no weight sees the tree: there one iteration decides where the next one looks.
 
 use crate::device::{self, dispatch};
-use canopy::bake::ZField;
 use canopy::forest::species::SpeciesData;
 use canopy::gpu::{Resource, Sampler, shaders};
 use canopy::physics::hash::Stream;
 use canopy::physics::views::{self, Basis, Lookup};
+use canopy::physics::zfield::ZField;
 use canopy::physics::zfield::{self, AGREEMENT, Ray};
 use canopy::plan::Plan;
 use glam::DVec3;

@@ -1,7 +1,7 @@
 //! The six effects of BN12, figure 9, near and far, each as a number and a picture.
 
+use canopy::camera::Eye;
 use canopy::frame::Renderer;
-use canopy::frame::camera::Eye;
 use canopy::measure::reflectance::{Measured, Method, Request, measure, patch_scene};
 use canopy::plan::{Plan, Representation};
 use canopy::scene::{Scene, Sky};
@@ -140,13 +140,13 @@ fn pictures(b: &Bench) {
             }
             let (t, a) = (f64::to_radians(view[0]), f64::to_radians(view[1]));
             let v = [t.sin() * a.sin(), -t.sin() * a.cos(), t.cos()];
-            let ground = canopy::physics::terrain::height_at(&scene.terrain, 1200.0, 1200.0);
+            let ground = scene.terrain.height_at(1200.0, 1200.0);
             let distance = 180.0 * if zoom > 1.0 { 5.0 } else { 1.0 };
             let position = [1200.0 + distance * v[0], 1200.0 + distance * v[1], ground + distance * v[2]];
             // Far is the same patch of ground in pixels that are as many times larger.
             let mut eye = Eye::looking(position, v.map(|c| -c), 40.0, [480, 360]);
             eye.pixels_at_1m /= zoom;
-            let exposure = canopy::frame::auto_exposure(&scene);
+            let exposure = canopy::camera::auto_exposure(&scene);
             let plan = Plan::for_eye(&scene, &eye, false, Representation::Auto, Some(b.gpu.info())).unwrap();
             let mut renderer = Renderer::new(&b.gpu, std::sync::Arc::new(scene), plan, &b.baked).unwrap();
             renderer.render_eye(&eye, exposure).unwrap();

@@ -1,6 +1,6 @@
 //! Nothing pops: slow dollies through every threshold.
 
-use canopy::frame::auto_exposure;
+use canopy::camera::auto_exposure;
 use canopy::scene::Camera;
 
 use crate::{bake, device, folder, plot};

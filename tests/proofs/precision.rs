@@ -1,8 +1,10 @@
 //! What storing a quantity in few bits costs, against 32: as shares of a step of radiance that the eye just sees.
 
-use canopy::bake::{ForestTables, Transfer, ZField};
 use canopy::physics::hash::Stream;
+use canopy::physics::tables::ForestTables;
+use canopy::physics::transfer::Transfer;
 use canopy::physics::views::{self, Basis};
+use canopy::physics::zfield::ZField;
 use canopy::physics::{tables, transfer, zfield};
 use glam::DVec3;
 use half::f16;

@@ -9,7 +9,7 @@ use crate::physics::transfer::{self, TERMS};
 use crate::physics::views::{self, Basis};
 use crate::physics::zfield::AGREEMENT;
 
-/// Shadows fainter than this are not drawn (`shaders/frame/tree_shadow.frag`).
+/// Shadows fainter than this are not drawn (`shaders/frame/trees/zfield_shadow.frag`).
 const FAINTEST: f32 = 1.0 / 64.0;
 
 /// One mip level, with a border of empty texels: outside lies transparent black.
@@ -127,7 +127,7 @@ pub struct FieldAim {
 /// Light transfer of all views, on one level.
 struct TransferLevel {
     size: usize,
-    /// By band, as in [`crate::bake::Transfer`].
+    /// By band, as in [`crate::physics::transfer::Transfer`].
     bands: Vec<Vec<u8>>,
 }
 

@@ -2,7 +2,8 @@
 
 use super::crown::Shape;
 use super::measure::{Estimate, Measured, PairEstimate};
-use super::{ForestSettings, ForestTables, mean_area, sky};
+use super::{ForestSettings, mean_area, sky};
+use crate::physics::tables::ForestTables;
 use crate::physics::tables::{density_node, light_node, secant, zenith_node};
 
 /// A transmittance counts as measured when it is this many times its standard error.

@@ -19,6 +19,7 @@ pub use crown::{Cast, Crown, LeafOptics, Seen, Shape, TransferAt};
 pub use field::{FieldAim, FieldCrown};
 pub use store::{key, load_or_measure, path};
 
+use crate::physics::tables::ForestTables;
 use crate::progress::Progress;
 use crate::settings::Settings;
 use crate::{Error, Result};
@@ -92,38 +93,6 @@ impl Default for ForestSettings {
             view_iterations: 2,
         }
     }
-}
-
-/// The measured tables; nodes, order and meaning are those of [`crate::physics::tables`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct ForestTables {
-    /// Nodes n of each angle.
-    pub angles: u32,
-    /// Nodes m of the density.
-    pub densities: u32,
-    /// Largest x = λA.
-    pub max_thickness: f32,
-    /// Mean horizontal tree area A, m².
-    pub area: f32,
-    /// k of S = diag(1, 1, k).
-    pub vertical_scale: f32,
-    /// 1/r² of the hole around a tree, over the density (BN12, eq. 9).
-    pub hole: f32,
-    /// Factor of the sky's light on a crown that is seen from the side, and its change with the cosine of the view's zenith
-    /// angle ([`crate::physics::tables`]).
-    pub sky: [f32; 2],
-    /// (W, T_leaf, T_bark, M).
-    pub pair: Vec<[f32; 4]>,
-    /// Standard errors of (k_g, T_leaf, T_bark, M).
-    pub pair_stderr: Vec<[f32; 4]>,
-    /// (V, E_leaf, E_bark, Γ_v).
-    pub view: Vec<[f32; 4]>,
-    /// Standard errors of (P, E_leaf, E_bark, Γ_v).
-    pub view_stderr: Vec<[f32; 4]>,
-    /// (D, C).
-    pub ground: Vec<[f32; 2]>,
-    /// Standard errors of (D, C).
-    pub ground_stderr: Vec<[f32; 2]>,
 }
 
 /// Mean horizontal area of a species' trees, m²: A = π `crown_radius`² E(scale²).

@@ -2,7 +2,7 @@
 
 use super::ForestSettings;
 use super::crown::Shape;
-use crate::forest::pattern::Pattern;
+use crate::land::pattern::Pattern;
 use crate::physics::hash::{Stream, hash2};
 
 /// Steps of a turn: azimuths of rays relative to trees are rounded to these. A step moves the edge of a crown of 5 m by

@@ -14,9 +14,10 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::ForestSettings;
 use super::crown::LeafOptics;
-use super::{ForestSettings, ForestTables};
 use crate::physics::light;
+use crate::physics::tables::ForestTables;
 use crate::physics::tables::{angles, density_node, pair, unscaled_zenith as zenith, zenith_node};
 
 /// Bins an octave of Λd², and octaves from 2⁻¹⁶ on.

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::crown::Shape;
 use super::field::FieldCrown;
-use super::{ForestSettings, ForestTables, RESOLUTION, check, measure};
+use super::{ForestSettings, RESOLUTION, check, measure};
 use crate::Result;
 use crate::bake::file::{Fields, Format, load_or_build};
 use crate::bake::{CacheState, SpeciesBake};
+use crate::physics::tables::ForestTables;
 
 const FORMAT: Format = Format { magic: *b"CANOPYFT", version: 5, extension: "forest" };
 

@@ -321,7 +321,7 @@ pub fn own<C: Crown>(
 }
 
 /// The ray of light to a receiver, past its own tree, which it enters after `entry` m: others shadow it if their back lies
-/// nearer the sun than that (`shaders/frame/tree_shade.glsl`).
+/// nearer the sun than that (`shaders/frame/trees/zfield_shade.glsl`).
 #[inline]
 pub fn light<C: Crown, const M: usize>(
     crown: &C,

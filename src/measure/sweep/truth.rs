@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::frame::auto_exposure;
-use crate::frame::camera::Eye;
+use crate::camera::{Eye, auto_exposure};
 use crate::image::Layers;
 use crate::progress::Progress;
 use crate::reference::{Options, World};

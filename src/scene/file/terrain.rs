@@ -4,9 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::super::keys::{Item, Table};
-use super::super::{Albedo, Raster, Terrain, raster, ridge, texture};
+use super::super::{Albedo, Terrain, raster, ridge, texture};
 use super::{MAX_METRES, existing};
 use crate::Result;
+use crate::physics::raster::Raster;
 
 /// The heightmap that needs no file.
 const BUILTIN: &str = "builtin:ridge";

@@ -3,7 +3,7 @@
 
 mod common;
 
-use canopy::scene::Raster;
+use canopy::physics::raster::Raster;
 use canopy::scene::raster::{load_density, load_heights};
 use libfuzzer_sys::fuzz_target;
 

@@ -1,0 +1,157 @@
+// The tree that each sample of a tile sees. One workgroup a tile of 8 x 8 pixels; one invocation a column of them.
+//
+// First the tile's list becomes bits: for each pixel, which of 32 trees' boxes it lies in. Then every invocation goes through its
+// pixels, and each pixel through its own trees, front to back, until the farthest thing that one of its samples sees is nearer than
+// the next tree can be. Long lists are gone through in parts; between parts the samples are in the buffer that holds the result.
+#include "physics/hash.glsl"
+#include "physics/masks.glsl"
+#include "frame/trees/tiles/fetch.glsl"
+#include "physics/zfield.glsl"
+#include "frame/trees/zfield_space.glsl"
+#include "frame/trees/tiles/order.glsl"
+#include "frame/trees/tiles/sight.glsl"
+#include "frame/trees/tiles/samples.glsl"
+
+const uint PART = 1024u;       // trees of a part of a list
+const uint WORDS = PART / 32u; // of bits a pixel
+// Drivers end loops in silence after 65,535 turns of all loops of an invocation together (llvmpipe): before, a tile gives up aloud.
+const uint MOST_TURNS = 60000u;
+
+layout(local_size_x = 8) in;
+layout(binding = 0) uniform usamplerBuffer records;
+layout(binding = 1) uniform usamplerBuffer boxes;
+layout(binding = 2) uniform usamplerBuffer entries;
+layout(binding = 3) uniform usamplerBuffer ends;    // of the lists' parts
+layout(std430, binding = 4) buffer State { TileState items[]; } state;
+layout(std430, binding = 5) buffer Seen { uint items[]; } seen;     // trees, counted from 1
+layout(std430, binding = 6) buffer Depths { float items[]; } depths; // of samples, in tiles whose list has several parts
+layout(binding = 7) uniform sampler2DArray views;
+layout(push_constant) uniform Push { TileParameters p; };
+layout(constant_id = 0) const uint SAMPLES = 4u;
+layout(constant_id = 1) const uint ESTIMATES = 1u;
+
+shared uint bits[WORDS * 64u];
+shared uint left; // whether a pixel may see trees of the next part
+
+// Bits of a tile's pixels that a tree's box covers: those of the first four rows, and of the last.
+uvec2 covered_pixels(uint tree, uvec2 corner) {
+    uvec2 b = texelFetch(boxes, int(tree)).xy;
+    ivec4 box = clamp(ivec4(b.x & 0xffffu, b.x >> 16u, b.y & 0xffffu, b.y >> 16u) - ivec4(corner, corner), ivec4(0), ivec4(8));
+    uint columns = ((1u << box.z) - 1u) & ~((1u << box.x) - 1u);
+    columns = box.z > box.x ? columns * 0x01010101u : 0u;
+    uint low = uint(min(box.y, 4)) * 8u, high = uint(min(box.w, 4)) * 8u;
+    uint top = (high < 32u ? (1u << high) - 1u : ~0u) & ~(low < 32u ? (1u << low) - 1u : ~0u);
+    low = uint(max(box.y, 4)) * 8u - 32u;
+    high = uint(max(box.w, 4)) * 8u - 32u;
+    uint bottom = (high < 32u ? (1u << high) - 1u : ~0u) & ~(low < 32u ? (1u << low) - 1u : ~0u);
+    return columns * uvec2(1u, 1u) & uvec2(top, bottom);
+}
+
+// Samples of one tree at a pixel, and their depth as the depth buffer holds it.
+uint sees(Sight s, vec2 pixel, out float depth) {
+    vec2 d = pixel - s.pixel;
+    float inverse_h = 1.0 + dot(s.tilt, d), h = 1.0 / inverse_h;
+    vec2 ab = (s.start + vec2(dot(s.across.xy, d), dot(s.across.zw, d))) * h;
+    float far = 1.0 / s.closeness;
+    vec3 at[3], to[3];
+    for (int k = 0; k < 3; k++) {
+        at[k] = ab.x * s.right[k] + ab.y * s.up[k];
+        to[k] = far * s.toward[k] - at[k];
+    }
+    vec3 w = vec3(s.weights, 1.0 - s.weights.x - s.weights.y);
+    bool below = s.layers >> 31u != 0u;
+    vec3 layers = unpack_layers(s.layers, s.first);
+    uint before = s.draw < 2u ? ESTIMATES : 0u;
+    Surface surface = zfield_search(views, at, to, layers, w, float(s.mip), s.draw == 0u ? 0u : before, s.draw == 0u ? before : 0u, below);
+    float along = clamp(surface.s, -1e3, 0.999);
+    float opacity = surface.s < 0.999 && inverse_h > 0.0 ? surface.opacity * s.fade : 0.0;
+    depth = min(p.near / s.depth * inverse_h / (1.0 - along), 1.0);
+    uint covered = covered_samples(opacity, s.dither, SAMPLES), mask = inner_column(s.row, covered, SAMPLES);
+    // The quad's edges part samples, as those of triangles do.
+    uint within = 0u;
+    for (uint k = 0u; k < SAMPLES; k++) {
+        vec2 o = sample_offset(k, SAMPLES);
+        vec2 c = ab + h * vec2(dot(s.across.xy, o), dot(s.across.zw, o));
+        bool inside = c.x >= s.extent.x && c.x <= s.extent.y && c.y >= s.extent.z && c.y <= s.extent.w;
+        within |= inside ? 1u << k : 0u;
+    }
+    return mask & within;
+}
+
+void main() {
+    uvec2 corner = gl_WorkGroupID.xy * TILE_SIDE;
+    uint column = gl_LocalInvocationIndex, turns = 0u;
+    uvec2 list_at = corner >> p.list_shift;
+    uint list = list_at.y * p.lists_across + list_at.x;
+    bool whole = state.items[0].whole != 0u;
+    uint first = 0u, end = state.items[0].tree_count;
+    if (!whole) {
+        first = list > 0u ? texelFetch(ends, int(list * BIN_LANES) - 1).x : 0u;
+        end = texelFetch(ends, int((list + 1u) * BIN_LANES) - 1).x;
+    }
+    bool more = true, parted = end > first + PART;
+    for (uint begin = first; more; begin += PART) {
+        uint count = min(end - min(begin, end), PART), words = (count + 31u) / 32u;
+        for (uint k = column; k < words * 64u; k += 8u) bits[k] = 0u;
+        barrier();
+        left = 0u;
+        for (uint k = column; k < count; k += 8u) {
+            uint tree = whole ? begin + k : texelFetch(entries, int(begin + k)).x;
+            uvec2 covered = covered_pixels(tree, corner);
+            while ((covered.x | covered.y) != 0u) {
+                uint pixel = covered.x != 0u ? uint(findLSB(covered.x)) : 32u + uint(findLSB(covered.y));
+                covered = covered.x != 0u ? uvec2(covered.x & (covered.x - 1u), covered.y) : uvec2(0u, covered.y & (covered.y - 1u));
+                atomicOr(bits[(k >> 5u) * 64u + pixel], 1u << (k & 31u));
+                turns++;
+            }
+            turns++;
+        }
+        barrier();
+        bool open = false;
+        for (uint row = 0u; row < TILE_SIDE; row++) {
+            uvec2 pixel = corner + uvec2(column, row);
+            bool inside = pixel.x < p.size.x && pixel.y < p.size.y;
+            uint at = (min(pixel.y, p.size.y - 1u) * p.size.x + min(pixel.x, p.size.x - 1u)) * SAMPLES;
+            float depth[8];
+            uint tree_of[8];
+            float farthest = 1.0;
+            for (uint k = 0u; k < SAMPLES; k++) {
+                depth[k] = begin > first ? depths.items[at + k] : ground_depth(ivec2(pixel), int(k));
+                tree_of[k] = begin > first ? seen.items[at + k] : 0u;
+                farthest = min(farthest, depth[k]);
+            }
+            bool done = !inside;
+            for (uint word = 0u; word < words && !done; word++) {
+                uint trees = bits[word * 64u + row * 8u + column];
+                while (trees != 0u && !done) {
+                    uint k = word * 32u + uint(findLSB(trees));
+                    trees &= trees - 1u;
+                    uint tree = whole ? begin + k : texelFetch(entries, int(begin + k)).x;
+                    Sight s = unpack_sight(records, tree);
+                    float z;
+                    uint mask = sees(s, vec2(pixel) + 0.5, z);
+                    done = farthest * bin_depth(s.bin) > p.near;
+                    float now = 1.0;
+                    for (uint i = 0u; i < SAMPLES; i++) {
+                        bool nearer = (mask >> i & 1u) != 0u && z >= depth[i] && !done;
+                        depth[i] = nearer ? z : depth[i];
+                        tree_of[i] = nearer ? tree + 1u : tree_of[i];
+                        now = min(now, depth[i]);
+                    }
+                    farthest = now;
+                    turns++;
+                }
+                turns++;
+            }
+            open = open || (inside && !done);
+            for (uint k = 0u; k < SAMPLES; k++) {
+                if (inside) seen.items[at + k] = tree_of[k];
+                if (inside && parted) depths.items[at + k] = depth[k];
+            }
+        }
+        if (open) atomicOr(left, 1u);
+        barrier();
+        more = parted && begin + PART < end && left != 0u;
+        if (turns > MOST_TURNS) state.items[0].overrun = 1u;
+    }
+}

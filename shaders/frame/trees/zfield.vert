@@ -1,0 +1,100 @@
+// A camera-facing quad around one tree. Everything that the fragment needs is linear along rays, so it is interpolated
+// over the quad (at p) and passed at the eye (at c): the value at p + s (c - p) follows from the two.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "interface.glsl"
+#include "physics/hash.glsl"
+#include "physics/light.glsl"
+#include "physics/transfer.glsl"
+#include "physics/zfield.glsl"
+#include "frame/trees/zfield_space.glsl"
+
+layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
+layout(std430, binding = 1) readonly buffer Trees { Tree items[]; } trees;
+layout(std430, binding = 2) readonly buffer Lists { uint items[]; } lists;
+layout(std140, binding = 3) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
+layout(std430, binding = 4) readonly buffer Bases { ViewBasis items[]; } bases;
+layout(std430, binding = 5) readonly buffer Masks { uvec4 items[]; } masks;
+layout(constant_id = 0) const int RINGS = 9;
+layout(constant_id = 1) const float RESOLUTION = 256.0;
+layout(constant_id = 2) const uint MASK_ROWS = 12u;
+
+layout(location = 0) out vec4 view_p[3];        // in the three views; w of the first: height in the tree
+layout(location = 3) out vec3 light_p[3];
+layout(location = 6) out vec3 shadow_p;
+layout(location = 7) flat out vec4 view_c[3];   // w: layer
+layout(location = 10) flat out vec4 light_c[3]; // w: layer
+layout(location = 13) flat out vec3 light_d[3]; // of one metre towards the sun
+layout(location = 16) flat out vec4 shadow_c;   // w: depth of one metre towards the sun
+layout(location = 17) flat out vec4 weights;    // of two views, of two light views
+layout(location = 18) flat out vec4 optics;     // mip, tau of the self-shadow times the phase angle, opacity factor, height of the eye in the tree
+layout(location = 19) flat out vec4 sun;        // w: 1 / r2 of the hole
+layout(location = 20) flat out vec4 sky;        // w: metres from the centre to the top
+layout(location = 21) flat out uvec4 tree_bits; // mask row; cascade | from below << 4 | species << 8
+layout(location = 22) flat out vec2 own;       // dither, c of the self-shadow times the root of the phase angle
+layout(location = 23) flat out vec4 bark;       // relative colour; w: height under which there is only bark
+layout(location = 24) flat out vec4 mean_sun;   // average light, times nu; w: 1 - nu
+layout(location = 26) flat out vec4 sun_from;   // in the tree's own axes; w: reach of light transfer
+layout(location = 25) flat out vec4 mean_sky;   // w: average lit fraction, times nu
+
+void main() {
+    View v = view.v;
+    Tree t = trees.items[lists.items[gl_VertexIndex >> 2]];
+    Species kind = species.items[t.species];
+    vec3 half_extent = kind.scale_to_metres * t.scale;
+    mat3 back = tree_rotation(t);
+    vec3 c = (back * -t.centre) / half_extent;
+
+    vec3 layers = unpack_layers(t.view_layers, kind.first_layer);
+    vec3 light_layers = unpack_layers(t.light_layers, kind.first_layer);
+    bool below = t.view_layers >> 31u != 0u;
+
+    // The quad lies on the plane through the centre across the view. From afar its extents are the tree's; near, points
+    // before the plane look larger by far / (far - depth), and depth is at most that of the cylinder.
+    float far = max(length(c), 1e-6);
+    vec3 w = c / far, right, up;
+    frame_across(w, right, up);
+    float reach = length(w.xy) + abs(w.z);
+    vec4 extent = tree_bounds(bases.items[uint(layers.x)].bounds, bases.items[uint(layers.y)].bounds,
+                              bases.items[uint(layers.z)].bounds, w, below, RINGS);
+    extent *= far / max(far - reach, 0.1 * far);
+    // Half a texel of the mip in use, so that bilinear edges are not cut.
+    vec2 margin = exp2(t.mip) / RESOLUTION * vec2(1.0, reach);
+    uint corner = gl_VertexIndex & 3u;
+    vec3 p = right * ((corner & 1u) == 0u ? extent.x - margin.x : extent.y + margin.x) +
+             up * ((corner & 2u) == 0u ? extent.z - margin.y : extent.w + margin.y);
+    vec3 position = world_from_tree(t, kind, p);
+    gl_Position = v.clip_from_world * vec4(position, 1.0);
+
+    vec3 toward = back * v.sun_direction;
+    vec3 l = toward / half_extent;
+    for (int i = 0; i < 3; i++) {
+        ViewBasis b = bases.items[uint(layers[i])];
+        view_p[i] = vec4(project(b, p), p.z);
+        view_c[i] = vec4(project(b, c), layers[i]);
+        ViewBasis lb = bases.items[uint(light_layers[i])];
+        light_p[i] = project(lb, p);
+        light_c[i] = vec4(project(lb, c), light_layers[i]);
+        light_d[i] = project(lb, l);
+    }
+    mat4 shadow = v.cascade_from_world[min(t.cascade, MAX_CASCADES - 1u)];
+    shadow_p = (shadow * vec4(position, 1.0)).xyz;
+    shadow_c = vec4(shadow[3].xyz, (shadow * vec4(v.sun_direction, 0.0)).z);
+    // A texel spans crowns whose backs slope by about one: half a texel towards the sun, or neighbours shade each other's rims.
+    float bias = 0.5 * v.cascade_texel[min(t.cascade, MAX_CASCADES - 1u)] * shadow_c.w;
+    shadow_p.z += bias;
+    shadow_c.z += bias;
+    weights = vec4(t.view_weights, t.light_weights);
+    // The model's metres: what is in a crown grows with it.
+    float phase_angle = angle_between(-t.centre, v.sun_direction);
+    sun_from = vec4(toward, transfer_reach(sqrt(phase_angle)));
+    optics = vec4(t.mip, kind.extinction * phase_angle / t.scale, t.fade, c.z);
+    sun = vec4(t.sun, t.hole);
+    sky = vec4(t.sky, half_extent.z);
+    uvec3 row = masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz;
+    tree_bits = uvec4(row, t.cascade | (below ? 16u : 0u) | t.species << 8u);
+    bark = vec4(kind.bark, kind.crown_base);
+    mean_sun = vec4(t.mean_sun, t.own);
+    mean_sky = vec4(t.mean_sky, t.mean_lit);
+    own = vec2(unit(hash(t.identity ^ HASH_DITHER)), kind.leaf_shadow * sqrt(phase_angle));
+}

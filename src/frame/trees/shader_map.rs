@@ -1,0 +1,69 @@
+//! The shader-map pass: forest fractions and radiances from the tables, at every second vertex of the terrain (BN12, section 6).
+
+use crate::Result;
+use crate::forest::terrain::{TerrainData, TerrainDraws};
+use crate::frame::Forest;
+use crate::frame::shadows::TerrainPush;
+use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
+use crate::plan::Plan;
+
+/// Nodes of every terrain quad in view, and what computes them.
+pub struct ShaderMap {
+    /// [`ForestNode`]s, 17 × 17 a quad, in the order of the camera's terrain quads.
+    pub nodes: Buffer,
+    program: Program,
+}
+
+impl ShaderMap {
+    /// Allocates for a plan.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, plan: &Plan, forest: &Forest) -> Result<Self> {
+        let float = |n: u32| (n as f32).to_bits();
+        Ok(ShaderMap {
+            nodes: gpu.buffer("shader-map nodes", plan.node_bytes())?,
+            program: gpu.compute(
+                &shaders::FRAME_TREES_SHADER_MAP_COMP,
+                &[
+                    (0, plan.cover_channels),
+                    (2, forest.species.count),
+                    (3, float(forest.tables.angles)),
+                    (4, float(forest.tables.densities)),
+                    (5, u32::from(plan.pair_tables)),
+                ],
+            )?,
+        })
+    }
+
+    /// Records the pass.
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        (terrain, draws): (&TerrainData, &TerrainDraws),
+        forest: &Forest,
+    ) {
+        if draws.camera.1 == 0 {
+            return;
+        }
+        recorder.compute("shader-map", |pass| {
+            pass.bind(
+                &self.program,
+                &[
+                    ("view", Resource::Buffer(view)),
+                    ("quads", Resource::Buffer(&terrain.quads)),
+                    ("height_tiles", Resource::Texture(&terrain.height_tiles, Sampler::Nearest)),
+                    ("slope_tiles", Resource::Texture(&terrain.slope_tiles, Sampler::Nearest)),
+                    ("cover_tiles", Resource::Texture(&forest.coverage.tiles, Sampler::Linear)),
+                    ("nodes", Resource::Buffer(&self.nodes)),
+                    ("pair_table", Resource::Texture(&forest.tables.pairs, Sampler::Linear)),
+                    ("view_table", Resource::Texture(&forest.tables.views, Sampler::Linear)),
+                    ("species", Resource::Buffer(&forest.species.table)),
+                ],
+            );
+            pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
+            pass.dispatch([draws.camera.1, 1, 1]);
+        });
+    }
+}

@@ -1,0 +1,264 @@
+//! The tile rasteriser: trees in view, seen first and lit once, in compute.
+//!
+//! 1. **order**: a stable counting sort of the camera's trees by the nearest depth that each can have.
+//! 2. **sight**: a record a tree, of all that finding its samples takes, and its box on the screen.
+//! 3. **lists**: for each square of pixels, the trees whose boxes reach into it, front to back.
+//! 4. **see**: a tile of 8 × 8 pixels at a time, for each sample the nearest tree, by the same search, opacity and masks as the
+//!    graphics pipeline's fragments; a pixel is done when all that it sees is nearer than the next tree can be.
+//! 5. **shade**: each pixel's distinct trees, once each, and the pixel from them and the ground.
+//!
+//! Nothing is assumed of subgroups, and no atomics decide an order. More entries than the lists hold are no error: every tile then
+//! looks at all trees in order (`TileState::whole`).
+
+use crate::forest::cull::CullData;
+use crate::frame::Forest;
+use crate::frame::targets::ImageTargets;
+use crate::gpu::interface::{
+    BIN_LANES, DEPTH_BINS, ORDER_LANES, SIGHT_TEXELS, TILE_SIDE, TileParameters, TileState,
+};
+use crate::gpu::{Buffer, Gpu, Image, Program, Recorder, Resource, Sampler, Shader, shaders, vk};
+use crate::plan::Plan;
+use crate::scene::Scene;
+use crate::{Error, Result};
+
+/// Steps of writing the lists (trees, and entries): an invocation takes 1/64 of them, and drivers end loops after 65,535 turns.
+const STEPS: u32 = 3 << 20;
+/// Lists of a picture, at most.
+const MOST_LISTS: u32 = 16384;
+
+const WORD: (vk::Format, u64) = (vk::Format::R32_UINT, 4);
+const TWO_WORDS: (vk::Format, u64) = (vk::Format::R32G32_UINT, 8);
+const FOUR_WORDS: (vk::Format, u64) = (vk::Format::R32G32B32A32_UINT, 16);
+
+/// Buffers and programs of the tiles.
+pub struct TreeTiles {
+    parameters: TileParameters,
+    tiles: [u32; 2],
+    /// Parts of all lists.
+    list_parts: u32,
+    keys: Buffer,
+    depth_counts: Buffer,
+    order: Buffer,
+    records: Buffer,
+    boxes: Buffer,
+    spans: Buffer,
+    list_counts: Buffer,
+    entries: Buffer,
+    /// What the passes find.
+    pub state: Buffer,
+    /// Trees that samples see, counted from 1, `samples` a pixel.
+    pub seen: Buffer,
+    depths: Buffer,
+    order_count: Program,
+    order_fill: Program,
+    scan: Program,
+    sight: Program,
+    entries_count: Program,
+    entries_fill: Program,
+    see: Program,
+    shade: Program,
+}
+
+impl TreeTiles {
+    /// Allocates for a plan and makes the programs.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, mask_rows: u32) -> Result<Self> {
+        let s = &scene.settings;
+        let shift =
+            (3..).find(|k| plan.size.iter().map(|n| n.div_ceil(1 << k)).product::<u32>() <= MOST_LISTS);
+        let shift = shift.unwrap_or(3);
+        let lists = plan.size.map(|n| n.div_ceil(1 << shift));
+        let list_count = u64::from(lists[0] * lists[1]);
+        let trees = u64::from(plan.tree_capacity);
+        let samples = u64::from(plan.size[0]) * u64::from(plan.size[1]) * u64::from(plan.samples);
+        let resolution = (s.view_resolution as f32).to_bits();
+        let before = s.view_iterations - 1;
+        let see: &'static Shader = if plan.samples > 1 {
+            &shaders::FRAME_TREES_TILES_SEE_COMP
+        } else {
+            &shaders::FRAME_TREES_TILES_SEE_SINGLE_COMP
+        };
+        let shade: &'static Shader = if plan.samples > 1 {
+            &shaders::FRAME_TREES_TILES_SHADE_COMP
+        } else {
+            &shaders::FRAME_TREES_TILES_SHADE_SINGLE_COMP
+        };
+        Ok(TreeTiles {
+            parameters: TileParameters {
+                size: plan.size,
+                lists_across: lists[0],
+                list_shift: shift,
+                near: crate::camera::NEAR_PLANE as f32,
+                step_capacity: STEPS,
+            },
+            list_parts: lists[0] * lists[1] * BIN_LANES,
+            tiles: plan.size.map(|n| n.div_ceil(TILE_SIDE)),
+            keys: gpu.buffer("tree depth bins", trees * 4)?,
+            depth_counts: gpu.buffer("depth counts", 4 + 4 * u64::from(DEPTH_BINS * ORDER_LANES))?,
+            order: gpu.buffer("trees front to back", trees * 4)?,
+            records: gpu.texel_buffer("tree sights", trees * 16 * u64::from(SIGHT_TEXELS), FOUR_WORDS)?,
+            boxes: gpu.texel_buffer("tree boxes", trees * 8, TWO_WORDS)?,
+            spans: gpu.buffer("tree spans", 4 + trees * 4)?,
+            list_counts: gpu.texel_buffer("list ends", 4 + 4 * list_count * u64::from(BIN_LANES), WORD)?,
+            entries: gpu.texel_buffer("list entries", 4 * u64::from(STEPS), WORD)?,
+            state: gpu.buffer("tile state", size_of::<TileState>() as u64)?,
+            seen: gpu.texel_buffer("trees seen", 4 * samples, WORD)?,
+            depths: gpu.buffer("depths seen", 4 * samples)?,
+            order_count: gpu.compute(&shaders::FRAME_TREES_TILES_ORDER_COUNT_COMP, &[])?,
+            order_fill: gpu.compute(&shaders::FRAME_TREES_TILES_ORDER_FILL_COMP, &[])?,
+            scan: gpu.compute(&shaders::FRAME_TREES_TILES_SCAN_COMP, &[])?,
+            sight: gpu.compute(
+                &shaders::FRAME_TREES_TILES_SIGHT_COMP,
+                &[(0, s.view_rings), (1, resolution), (2, mask_rows), (3, plan.samples)],
+            )?,
+            entries_count: gpu.compute(&shaders::FRAME_TREES_TILES_ENTRIES_COUNT_COMP, &[])?,
+            entries_fill: gpu.compute(&shaders::FRAME_TREES_TILES_ENTRIES_FILL_COMP, &[])?,
+            see: gpu.compute(see, &[(0, plan.samples), (1, before)])?,
+            shade: gpu.compute(
+                shade,
+                &[
+                    (0, plan.samples),
+                    (1, before),
+                    // Without sun no ray goes to it.
+                    (2, if plan.cascades > 0 { s.light_iterations } else { 0 }),
+                    (3, u32::from(plan.cascades > 0)),
+                    (4, plan.transfer_bands),
+                ],
+            )?,
+        })
+    }
+
+    /// Records all passes.
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        forest: &Forest,
+        cull: &CullData,
+        shadow_map: &Image,
+        targets: &ImageTargets,
+    ) {
+        if forest.seeds.visible == 0 {
+            return;
+        }
+        let p = &self.parameters;
+        let ground = targets.depth.drawn();
+        let all = [
+            ("view", Resource::Buffer(view)),
+            ("trees", Resource::Buffer(&cull.trees)),
+            ("lists", Resource::Buffer(&cull.lists)),
+            ("commands", Resource::Buffer(&cull.commands)),
+            ("species", Resource::Buffer(&forest.species.table)),
+            ("bases", Resource::Buffer(&forest.species.bases)),
+            ("masks", Resource::Buffer(&forest.species.masks)),
+            ("keys", Resource::Buffer(&self.keys)),
+            ("order", Resource::Buffer(&self.order)),
+            ("spans", Resource::Buffer(&self.spans)),
+            ("state", Resource::Buffer(&self.state)),
+            ("depths", Resource::Buffer(&self.depths)),
+            ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
+            ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
+            ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
+            ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+            ("radiance", Resource::Storage(&targets.colors[0].image)),
+        ];
+        recorder.compute("tree order", |pass| {
+            let depth = with(&all, &[("counts", Resource::Buffer(&self.depth_counts))]);
+            pass.bind(&self.order_count, &depth);
+            pass.dispatch([ORDER_LANES / 8, 1, 1]);
+            pass.barrier();
+            pass.bind(&self.scan, &with(&all, &[("sums", Resource::Buffer(&self.depth_counts))]));
+            pass.push(&(DEPTH_BINS * ORDER_LANES));
+            pass.dispatch([1, 1, 1]);
+            pass.barrier();
+            pass.bind(&self.order_fill, &depth);
+            pass.dispatch([ORDER_LANES / 8, 1, 1]);
+        });
+        let own = with(
+            &all,
+            &[
+                ("records", Resource::Buffer(&self.records)),
+                ("boxes", Resource::Buffer(&self.boxes)),
+                ("counts", Resource::Buffer(&self.list_counts)),
+                ("entries", Resource::Buffer(&self.entries)),
+            ],
+        );
+        recorder.compute("tree sights", |pass| {
+            pass.bind(&self.sight, &own);
+            pass.push(p);
+            pass.dispatch_indirect(&self.state, std::mem::offset_of!(TileState, tree_groups) as u64);
+        });
+        recorder.fill("list counts", &self.list_counts, 0);
+        recorder.compute("tile lists", |pass| {
+            pass.bind(&self.scan, &with(&all, &[("sums", Resource::Buffer(&self.spans))]));
+            pass.push(&0u32);
+            pass.dispatch([1, 1, 1]);
+            pass.barrier();
+            pass.bind(&self.entries_count, &own);
+            pass.push(p);
+            pass.dispatch([BIN_LANES / 8, 1, 1]);
+            pass.barrier();
+            pass.bind(&self.scan, &with(&all, &[("sums", Resource::Buffer(&self.list_counts))]));
+            pass.push(&self.list_parts);
+            pass.dispatch([1, 1, 1]);
+            pass.barrier();
+            pass.bind(&self.entries_fill, &own);
+            pass.push(p);
+            pass.dispatch([BIN_LANES / 8, 1, 1]);
+        });
+        let [across, down] = self.tiles;
+        recorder.compute("tiles", |pass| {
+            let found = with(
+                &all,
+                &[
+                    ("records", Resource::Texels(&self.records)),
+                    ("boxes", Resource::Texels(&self.boxes)),
+                    ("entries", Resource::Texels(&self.entries)),
+                    ("ends", Resource::Texels(&self.list_counts)),
+                    ("seen", Resource::Buffer(&self.seen)),
+                    ("ground", Resource::Texture(ground, Sampler::Nearest)),
+                ],
+            );
+            pass.bind(&self.see, &found);
+            pass.push(p);
+            pass.dispatch([across, down, 1]);
+        });
+        recorder.compute("tree light", |pass| {
+            let seen = with(
+                &all,
+                &[
+                    ("seen", Resource::Texels(&self.seen)),
+                    ("ground", Resource::Texture(targets.colors[0].drawn(), Sampler::Nearest)),
+                ],
+            );
+            pass.bind(&self.shade, &seen);
+            pass.push(p);
+            pass.dispatch([across, down, 1]);
+        });
+    }
+
+    /// Checks what the last frame's tiles found.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when a tile had more to look at than drivers let a shader do.
+    pub fn check(&self, gpu: &Gpu) -> Result<()> {
+        let state: Vec<TileState> = gpu.read(&self.state, 0, 1)?;
+        if state[0].overrun != 0 {
+            return Err(Error::Usage(
+                "more trees stand one behind the other than tiles can go through: use --rasterizer graphics"
+                    .into(),
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Resources of all passes, and more.
+fn with<'a>(
+    all: &[(&'static str, Resource<'a>)],
+    more: &[(&'static str, Resource<'a>)],
+) -> Vec<(&'static str, Resource<'a>)> {
+    [all, more].concat()
+}

@@ -1,0 +1,102 @@
+//! The tree pass: one quad a tree, front to back, each with its own sample mask (BN12, section 5 and 8).
+
+use crate::Result;
+use crate::forest::cull::CullData;
+use crate::frame::Forest;
+use crate::frame::targets::ImageTargets;
+use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand};
+use crate::gpu::{
+    Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets, shaders,
+};
+use crate::plan::{Plan, ViewMode};
+use crate::scene::Scene;
+
+/// Draws z-field trees.
+pub struct Trees {
+    /// For the near, middle, far and converged bins: texels magnified, estimates filtered; not magnified; without
+    /// estimates; and without light of its own.
+    programs: [Program; CAMERA_DRAWS as usize],
+}
+
+impl Trees {
+    /// Makes the program.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the device fails.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, mask_rows: u32) -> Result<Self> {
+        let s = &scene.settings;
+        let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
+        let before = s.view_iterations - 1;
+        let program = |estimates: u32, magnified: bool, converged: bool| {
+            gpu.graphics(&GraphicsDesc {
+                vert: &shaders::FRAME_TREES_ZFIELD_VERT,
+                frag: match plan.view_mode {
+                    ViewMode::Radiance if plan.layers => &shaders::FRAME_TREES_ZFIELD_LAYERS_FRAG,
+                    ViewMode::Radiance => &shaders::FRAME_TREES_ZFIELD_FRAG,
+                    _ => &shaders::FRAME_TREES_ZFIELD_MODE_FRAG,
+                },
+                colors: &formats,
+                samples: plan.samples,
+                depth: DepthTest::Reverse,
+                constants: &[
+                    (0, s.view_rings),
+                    (1, (s.view_resolution as f32).to_bits()),
+                    (2, mask_rows),
+                    (3, plan.samples),
+                    (4, estimates),
+                    // Without sun no ray goes to it.
+                    (5, if plan.cascades > 0 { s.light_iterations } else { 0 }),
+                    (6, u32::from(plan.cascades > 0)),
+                    (7, u32::from(magnified)),
+                    (8, u32::from(converged)),
+                    (9, plan.transfer_bands),
+                    (12, plan.view_mode as u32),
+                ],
+            })
+        };
+        Ok(Trees {
+            programs: [
+                program(before, true, false)?,
+                program(before, false, false)?,
+                program(0, false, false)?,
+                program(0, false, true)?,
+            ],
+        })
+    }
+
+    /// Records the pass.
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        forest: &Forest,
+        cull: &CullData,
+        shadow_map: &Image,
+        targets: &ImageTargets,
+    ) {
+        let colors: Vec<_> = targets.colors.iter().map(|t| t.attachment(None, true)).collect();
+        let depth = Some(targets.depth.attachment(None, true));
+        recorder.render("trees", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
+            if forest.seeds.visible == 0 {
+                return;
+            }
+            let bound = [
+                ("view", Resource::Buffer(view)),
+                ("trees", Resource::Buffer(&cull.trees)),
+                ("lists", Resource::Buffer(&cull.lists)),
+                ("species", Resource::Buffer(&forest.species.table)),
+                ("bases", Resource::Buffer(&forest.species.bases)),
+                ("masks", Resource::Buffer(&forest.species.masks)),
+                ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
+                ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
+                ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
+                ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+            ];
+            for (k, program) in self.programs.iter().enumerate() {
+                pass.bind(program, &bound);
+                let command = (k * size_of::<DrawCommand>()) as u64;
+                pass.draw_indexed_indirect(&forest.seeds.quad_indices, &cull.commands, command);
+            }
+        });
+    }
+}
