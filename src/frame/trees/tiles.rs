@@ -42,6 +42,7 @@ pub struct TreeTiles {
     records: Buffer,
     boxes: Buffer,
     spans: Buffer,
+    ranked: Buffer,
     list_counts: Buffer,
     entries: Buffer,
     /// What the passes find.
@@ -100,6 +101,7 @@ impl TreeTiles {
             order: gpu.buffer("trees front to back", trees * 4)?,
             records: gpu.texel_buffer("tree sights", trees * 16 * u64::from(SIGHT_TEXELS), FOUR_WORDS)?,
             boxes: gpu.texel_buffer("tree boxes", trees * 8, TWO_WORDS)?,
+            ranked: gpu.texel_buffer("trees by rank", trees * 4, WORD)?,
             spans: gpu.buffer("tree spans", 4 + trees * 4)?,
             list_counts: gpu.texel_buffer("list ends", 4 + 4 * list_count * u64::from(BIN_LANES), WORD)?,
             entries: gpu.texel_buffer("list entries", 4 * u64::from(STEPS), WORD)?,
@@ -147,11 +149,11 @@ impl TreeTiles {
         let ground = targets.depth.drawn();
         let all = [
             ("view", Resource::Buffer(view)),
-            ("trees", Resource::Buffer(&cull.trees)),
+            ("trees", Resource::Texels(&cull.trees)),
             ("lists", Resource::Buffer(&cull.lists)),
             ("commands", Resource::Buffer(&cull.commands)),
             ("species", Resource::Buffer(&forest.species.table)),
-            ("bases", Resource::Buffer(&forest.species.bases)),
+            ("bases", Resource::Texels(&forest.species.bases)),
             ("masks", Resource::Buffer(&forest.species.masks)),
             ("keys", Resource::Buffer(&self.keys)),
             ("order", Resource::Buffer(&self.order)),
@@ -165,7 +167,10 @@ impl TreeTiles {
             ("radiance", Resource::Storage(&targets.colors[0].image)),
         ];
         recorder.compute("tree order", |pass| {
-            let depth = with(&all, &[("counts", Resource::Buffer(&self.depth_counts))]);
+            let depth = with(
+                &all,
+                &[("counts", Resource::Buffer(&self.depth_counts)), ("trees", Resource::Buffer(&cull.trees))],
+            );
             pass.bind(&self.order_count, &depth);
             pass.dispatch([ORDER_LANES / 8, 1, 1]);
             pass.barrier();
@@ -181,6 +186,7 @@ impl TreeTiles {
             &[
                 ("records", Resource::Buffer(&self.records)),
                 ("boxes", Resource::Buffer(&self.boxes)),
+                ("ranked", Resource::Buffer(&self.ranked)),
                 ("counts", Resource::Buffer(&self.list_counts)),
                 ("entries", Resource::Buffer(&self.entries)),
             ],
@@ -230,6 +236,7 @@ impl TreeTiles {
                 &all,
                 &[
                     ("seen", Resource::Texels(&self.seen)),
+                    ("ranked", Resource::Texels(&self.ranked)),
                     ("ground", Resource::Texture(targets.colors[0].drawn(), Sampler::Nearest)),
                 ],
             );
@@ -255,10 +262,10 @@ impl TreeTiles {
     }
 }
 
-/// Resources of all passes, and more.
+/// Resources of a pass, and those of all, whose names it may take.
 fn with<'a>(
     all: &[(&'static str, Resource<'a>)],
     more: &[(&'static str, Resource<'a>)],
 ) -> Vec<(&'static str, Resource<'a>)> {
-    [all, more].concat()
+    [more, all].concat()
 }
