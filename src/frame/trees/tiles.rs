@@ -81,11 +81,6 @@ impl TreeTiles {
         } else {
             &shaders::FRAME_TREES_TILES_SEE_SINGLE_COMP
         };
-        let shade: &'static Shader = if plan.samples > 1 {
-            &shaders::FRAME_TREES_TILES_SHADE_COMP
-        } else {
-            &shaders::FRAME_TREES_TILES_SHADE_SINGLE_COMP
-        };
         Ok(TreeTiles {
             parameters: TileParameters {
                 size: plan.size,
@@ -119,7 +114,7 @@ impl TreeTiles {
             entries_fill: gpu.compute(&shaders::FRAME_TREES_TILES_ENTRIES_FILL_COMP, &[])?,
             see: gpu.compute(see, &[(0, plan.samples), (1, before)])?,
             shade: gpu.compute(
-                shade,
+                &shaders::FRAME_TREES_TILES_SHADE_COMP,
                 &[
                     (0, plan.samples),
                     (1, before),
@@ -132,19 +127,15 @@ impl TreeTiles {
         })
     }
 
-    /// Records all passes.
-    pub fn record(
+    /// Records the passes that find which tree each sample sees before the ground.
+    pub fn see(
         &self,
         recorder: &mut Recorder,
         view: &Buffer,
         forest: &Forest,
         cull: &CullData,
-        shadow_map: &Image,
         targets: &ImageTargets,
     ) {
-        if forest.seeds.visible == 0 {
-            return;
-        }
         let p = &self.parameters;
         let ground = targets.depth.drawn();
         let all = [
@@ -161,10 +152,6 @@ impl TreeTiles {
             ("state", Resource::Buffer(&self.state)),
             ("depths", Resource::Buffer(&self.depths)),
             ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
-            ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
-            ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
-            ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
-            ("radiance", Resource::Storage(&targets.colors[0].image)),
         ];
         recorder.compute("tree order", |pass| {
             let depth = with(
@@ -231,17 +218,37 @@ impl TreeTiles {
             pass.push(p);
             pass.dispatch([across, down, 1]);
         });
+    }
+
+    /// Records the pass that lights them, on top of what else their pixels' samples see.
+    pub fn shade(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        forest: &Forest,
+        cull: &CullData,
+        shadow_map: &Image,
+        targets: &ImageTargets,
+    ) {
+        let [across, down] = self.tiles;
         recorder.compute("tree light", |pass| {
-            let seen = with(
-                &all,
+            pass.bind(
+                &self.shade,
                 &[
-                    ("seen", Resource::Texels(&self.seen)),
+                    ("view", Resource::Buffer(view)),
+                    ("trees", Resource::Texels(&cull.trees)),
                     ("ranked", Resource::Texels(&self.ranked)),
-                    ("ground", Resource::Texture(targets.colors[0].drawn(), Sampler::Nearest)),
+                    ("species", Resource::Buffer(&forest.species.table)),
+                    ("bases", Resource::Texels(&forest.species.bases)),
+                    ("seen", Resource::Texels(&self.seen)),
+                    ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
+                    ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
+                    ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
+                    ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+                    ("radiance", Resource::Storage(&targets.colors[0].image)),
                 ],
             );
-            pass.bind(&self.shade, &seen);
-            pass.push(p);
+            pass.push(&self.parameters);
             pass.dispatch([across, down, 1]);
         });
     }

@@ -10,7 +10,7 @@
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/tiles/order.glsl"
 #include "frame/trees/tiles/sight.glsl"
-#include "frame/trees/tiles/samples.glsl"
+#include "frame/samples.glsl"
 
 const uint PART = 1024u;       // trees of a part of a list
 const uint WORDS = PART / 32u; // of bits a pixel

@@ -10,6 +10,7 @@
 #include "physics/transfer.glsl"
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/zfield_light.glsl"
+#include "frame/camera.glsl"
 #include "frame/trees/tiles/box.glsl"
 
 layout(local_size_x = 8) in;

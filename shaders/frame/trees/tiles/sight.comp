@@ -6,6 +6,7 @@
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/tiles/order.glsl"
 #include "frame/trees/tiles/sight.glsl"
+#include "frame/camera.glsl"
 #include "frame/trees/tiles/box.glsl"
 
 layout(local_size_x = 64) in;
