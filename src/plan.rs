@@ -255,7 +255,7 @@ impl Plan {
             items: Vec::new(),
             representation,
             view_mode: ViewMode::Radiance,
-            rasterizer: if layers { Rasterizer::Graphics } else { Rasterizer::auto(device) },
+            rasterizer: Rasterizer::auto(device),
             size: eye.size,
             samples: samples(s.samples, device),
             layers,
@@ -331,6 +331,11 @@ impl Plan {
     /// Distance to which any tree is drawn, m: those on silhouettes go on beyond the range.
     pub fn last_range(&self) -> f64 {
         self.range * self.silhouette_reach
+    }
+
+    /// Whether the picture shows trees that are drawn one by one: in a view mode of the ground they would hide it.
+    pub fn shows_trees(&self) -> bool {
+        self.z_fields && self.view_mode != ViewMode::Coverage
     }
 
     /// Layers of a coverage tile.

@@ -4,15 +4,17 @@
 #include "frame/camera.glsl"
 #include "frame/samples.glsl"
 #include "frame/forest_node.glsl"
+#include "frame/view_mode.glsl"
+#include "frame/ground_mode.glsl"
+#include "frame/shown.glsl"
 
 layout(local_size_x = 8) in;
 layout(binding = 1) uniform usamplerBuffer quads;   // of three texels
 layout(binding = 7) uniform samplerBuffer nodes;    // of four texels
 layout(binding = 8) uniform usamplerBuffer trees_seen; // counted from 1, a sample
-layout(binding = 9, rgba16f) uniform image2DArray radiance; // the sky, if that is an image
 layout(constant_id = 2) const uint SAMPLES = 4u;
 layout(constant_id = 3) const bool TREES = true;    // some are drawn before the ground
-layout(constant_id = 4) const bool SKY_IMAGE = false;
+layout(constant_id = 4) const bool SKY_IMAGE = false; // and in the picture already, as if all samples saw it
 
 TerrainQuad fetch_quad(uint quad) {
     int at = int(quad) * 3;
@@ -67,6 +69,11 @@ GroundPoint point_of(uint index, vec3 position, vec3 ray, float distance, Camera
 shared uint items[64];     // pixels of each column that see ground: its row | samples << 8
 shared uint counts[8];
 
+Shown sky_at(ivec2 pixel) {
+    if (SKY_IMAGE) return load_pixel(pixel);
+    return shown_sky(view.v.sky_radiance);
+}
+
 // Lists the pixels of this invocation's column that see ground. Where others see the sky, that is all that they do.
 void list_pixels(uvec2 corner, uint column, uvec2 size) {
     uint count = 0u;
@@ -84,17 +91,16 @@ void list_pixels(uvec2 corner, uint column, uvec2 size) {
             items[column * 8u + count] = row | samples << 8u | open << 16u;
             count++;
         }
-        // A sky that is an image is there already, as if all samples saw it.
         if (inside && samples == 0u && open != 0u && (!SKY_IMAGE || open + 1u != 1u << SAMPLES)) {
-            vec3 sky = SKY_IMAGE ? imageLoad(radiance, ivec3(pixel, 0)).rgb : view.v.sky_radiance;
-            imageStore(radiance, ivec3(pixel, 0), vec4(sky * (float(bitCount(open)) / float(SAMPLES)), 0.0));
+            store_pixel(ivec2(pixel), scaled(sky_at(ivec2(pixel)), float(bitCount(open)) / float(SAMPLES)));
         }
+        if (inside && (open & 1u) != 0u) store_first(ivec2(pixel), 0u, ground_depth(ivec2(pixel), 0));
     }
     counts[column] = count;
 }
 
-// Light of the ground that a pixel's samples see; `seen` are they.
-GroundLight light_of(ivec2 pixel, uint seen, vec2 size) {
+// The ground that a pixel's samples see; `seen` are they.
+Shown ground_at(ivec2 pixel, uint seen, vec2 size) {
     Camera camera = camera_of(view.v, size);
     // The mean of what samples see of the first one's quad.
     uint quad = 0u;
@@ -112,7 +118,13 @@ GroundLight light_of(ivec2 pixel, uint seen, vec2 size) {
     vec3 position = sum / count, n;
     float distance = dot(position, camera.forward);
     GroundPoint at = point_of(quad - 1u, position, position / distance, distance, camera, n);
-    return ground_light(at, n);
+    GroundLight g = ground_light(at, n);
+#ifdef LAYERS
+    return Shown(vec4(g.sun, 1.0), vec4(g.sky, g.trees), g.fractions);
+#else
+    if (VIEW_MODE != 0u) return Shown(vec4(ground_mode(at, g, n), 1.0));
+    return Shown(vec4(g.sun + g.sky, 1.0));
+#endif
 }
 
 // Item i of the tile, counted column after column: its column | row << 3 | samples << 8 | open samples << 16.
@@ -127,4 +139,21 @@ uint item(uint i) {
         before += count;
     }
     return found;
+}
+
+void main() {
+    uvec2 size = picture_size(), corner = gl_WorkGroupID.xy * TILE_SIDE;
+    uint column = gl_LocalInvocationIndex;
+    list_pixels(corner, column, size);
+    barrier();
+    uint total = 0u;
+    for (uint c = 0u; c < 8u; c++) total += counts[c];
+    for (uint i = column; i < total; i += 8u) {
+        uint found = item(i);
+        ivec2 pixel = ivec2(corner + uvec2(found & 7u, found >> 3u & 7u));
+        uint seen = found >> 8u & 0xffu, sky = found >> 16u & ~seen;
+        float part = 1.0 / float(SAMPLES);
+        Shown ground = scaled(ground_at(pixel, seen, vec2(size)), part * float(bitCount(seen)));
+        store_pixel(pixel, sum(ground, scaled(sky_at(pixel), part * float(bitCount(sky)))));
+    }
 }

@@ -316,7 +316,8 @@ impl Renderer {
                 GroundPass::Seen(pass) => {
                     let (view, indices, targets) = (&self.view, &self.terrain_indices, &self.targets);
                     pass.see(r, view, indices, ground, targets);
-                    let trees = near.and_then(|(forest, near)| match &near.pass {
+                    let shown = near.filter(|_| plan.shows_trees());
+                    let trees = shown.and_then(|(forest, near)| match &near.pass {
                         TreePass::Tiles(tiles) => Some((tiles, forest, &near.cull)),
                         TreePass::Graphics(_) => None,
                     });

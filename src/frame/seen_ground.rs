@@ -29,8 +29,12 @@ impl SeenGround {
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
-        let light =
-            if plan.samples > 1 { &shaders::FRAME_GROUND_COMP } else { &shaders::FRAME_GROUND_SINGLE_COMP };
+        let light = match (plan.layers, plan.samples > 1) {
+            (false, true) => &shaders::FRAME_GROUND_COMP,
+            (false, false) => &shaders::FRAME_GROUND_SINGLE_COMP,
+            (true, true) => &shaders::FRAME_GROUND_LAYERS_COMP,
+            (true, false) => &shaders::FRAME_GROUND_LAYERS_SINGLE_COMP,
+        };
         Ok(SeenGround {
             mesh: gpu.graphics(&GraphicsDesc {
                 vert: &shaders::FRAME_TERRAIN_SEEN_VERT,
@@ -46,10 +50,11 @@ impl SeenGround {
                     (0, plan.cover_channels),
                     (1, (plan.coverage_size as f32).to_bits()),
                     (2, plan.samples),
-                    (3, u32::from(plan.z_fields)),
+                    (3, u32::from(plan.shows_trees())),
                     (4, u32::from(matches!(scene.sky, Sky::LatLong { .. }))),
                     (5, u32::from(plan.cascades > 0)),
                     (6, u32::from(plan.cascades > 0)),
+                    (12, plan.view_mode as u32),
                 ],
             )?,
             tiles: plan.size.map(|n| n.div_ceil(TILE_SIDE)),
@@ -97,23 +102,21 @@ impl SeenGround {
         let Some(quads_seen) = &targets.quads else { return };
         let (tiles, nodes) = self.none.or(forest);
         recorder.compute("ground", |pass| {
-            pass.bind(
-                &self.light,
-                &[
-                    ("view", Resource::Buffer(view)),
-                    ("quads", Resource::Texels(&terrain.quads)),
-                    ("slope_tiles", Resource::Texture(&terrain.slope_tiles, Sampler::Linear)),
-                    ("albedo", Resource::Texture(&terrain.albedo, Sampler::Linear)),
-                    ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
-                    ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
-                    ("nodes", Resource::Texels(nodes)),
-                    // Without trees nothing of it is read.
-                    ("trees_seen", Resource::Texels(trees_seen.unwrap_or(&terrain.quads))),
-                    ("radiance", Resource::Storage(&targets.colors[0].image)),
-                    ("depth", Resource::Texture(targets.depth.drawn(), Sampler::Nearest)),
-                    ("quads_seen", Resource::Texture(quads_seen.drawn(), Sampler::Nearest)),
-                ],
-            );
+            let more = targets.shown();
+            let all = [
+                ("view", Resource::Buffer(view)),
+                ("quads", Resource::Texels(&terrain.quads)),
+                ("slope_tiles", Resource::Texture(&terrain.slope_tiles, Sampler::Linear)),
+                ("albedo", Resource::Texture(&terrain.albedo, Sampler::Linear)),
+                ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+                ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
+                ("nodes", Resource::Texels(nodes)),
+                // Without trees nothing of it is read.
+                ("trees_seen", Resource::Texels(trees_seen.unwrap_or(&terrain.quads))),
+                ("depth", Resource::Texture(targets.depth.drawn(), Sampler::Nearest)),
+                ("quads_seen", Resource::Texture(quads_seen.drawn(), Sampler::Nearest)),
+            ];
+            pass.bind(&self.light, &[&all[..], &more].concat());
             pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
             pass.dispatch([self.tiles[0], self.tiles[1], 1]);
         });

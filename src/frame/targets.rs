@@ -3,7 +3,7 @@
 use half::f16;
 
 use crate::camera::NEAR_PLANE;
-use crate::gpu::{Attachment, Buffer, Gpu, Image, ImageDesc, vk};
+use crate::gpu::{Attachment, Buffer, Gpu, Image, ImageDesc, Resource, vk};
 use crate::image::{Linear, Picture};
 use crate::plan::{Plan, Rasterizer};
 use crate::{Result, gpu};
@@ -69,6 +69,8 @@ pub struct ImageTargets {
     pub depth: ColorTarget,
     /// Quad of terrain that each sample sees, counted from 1, where the ground is lit once it is known to be seen.
     pub quads: Option<ColorTarget>,
+    /// Depth of each pixel's first sample, where tiles write layers: what they see is in no depth buffer.
+    first_depth: Option<Image>,
     /// Display picture, a word a pixel.
     pub picture: Buffer,
 }
@@ -101,6 +103,19 @@ impl ImageTargets {
             quads: tiles
                 .then(|| ColorTarget::new(gpu, plan, "quads seen", vk::Format::R32_UINT, color, plan.samples))
                 .transpose()?,
+            first_depth: (tiles && plan.layers)
+                .then(|| {
+                    gpu.image(&ImageDesc {
+                        name: "first depth",
+                        format: vk::Format::R32_SFLOAT,
+                        size: plan.size,
+                        layers: 1,
+                        levels: 1,
+                        samples: 1,
+                        usage: vk::ImageUsageFlags::STORAGE,
+                    })
+                })
+                .transpose()?,
             picture: gpu.buffer("picture", pixels * 4)?,
         })
     }
@@ -118,7 +133,8 @@ impl ImageTargets {
             let (sun, sky) = (part(0)?, part(1)?);
             let rgb =
                 |t: &[u16; 4]| [0, 1, 2].map(|k| (f64::from(f16::from_bits(t[k]).to_f32()) / scale) as f32);
-            let depth = gpu.read_image::<f32>(&self.depth.image, 0, 0)?;
+            let depth =
+                gpu.read_image::<f32>(self.first_depth.as_ref().unwrap_or(&self.depth.image), 0, 0)?;
             Ok(Linear {
                 sun: sun.iter().map(rgb).collect(),
                 sky: sky.iter().map(rgb).collect(),
@@ -131,6 +147,17 @@ impl ImageTargets {
             })
         });
         Ok(Picture { size: plan.size, display, linear: linear.transpose()? })
+    }
+
+    /// The resolved colour images by the names that compute shaders have for them.
+    pub fn shown(&self) -> Vec<(&'static str, Resource<'_>)> {
+        let names: &[&str] = match self.colors.len() {
+            1 => &["radiance"],
+            _ => &["sun_part", "sky_part", "species_at", "fractions"],
+        };
+        let colors = names.iter().zip(&self.colors).map(|(name, c)| (*name, &c.image));
+        let depth = self.first_depth.iter().map(|image| ("depth_at", image));
+        colors.chain(depth).map(|(name, image)| (name, Resource::Storage(image))).collect()
     }
 
     /// Colour attachments with and without layers.

@@ -114,7 +114,11 @@ impl TreeTiles {
             entries_fill: gpu.compute(&shaders::FRAME_TREES_TILES_ENTRIES_FILL_COMP, &[])?,
             see: gpu.compute(see, &[(0, plan.samples), (1, before)])?,
             shade: gpu.compute(
-                &shaders::FRAME_TREES_TILES_SHADE_COMP,
+                if plan.layers {
+                    &shaders::FRAME_TREES_TILES_SHADE_LAYERS_COMP
+                } else {
+                    &shaders::FRAME_TREES_TILES_SHADE_COMP
+                },
                 &[
                     (0, plan.samples),
                     (1, before),
@@ -122,6 +126,7 @@ impl TreeTiles {
                     (2, if plan.cascades > 0 { s.light_iterations } else { 0 }),
                     (3, u32::from(plan.cascades > 0)),
                     (4, plan.transfer_bands),
+                    (12, plan.view_mode as u32),
                 ],
             )?,
         })
@@ -232,22 +237,20 @@ impl TreeTiles {
     ) {
         let [across, down] = self.tiles;
         recorder.compute("tree light", |pass| {
-            pass.bind(
-                &self.shade,
-                &[
-                    ("view", Resource::Buffer(view)),
-                    ("trees", Resource::Texels(&cull.trees)),
-                    ("ranked", Resource::Texels(&self.ranked)),
-                    ("species", Resource::Buffer(&forest.species.table)),
-                    ("bases", Resource::Texels(&forest.species.bases)),
-                    ("seen", Resource::Texels(&self.seen)),
-                    ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
-                    ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
-                    ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
-                    ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
-                    ("radiance", Resource::Storage(&targets.colors[0].image)),
-                ],
-            );
+            let shown = targets.shown();
+            let all = [
+                ("view", Resource::Buffer(view)),
+                ("trees", Resource::Texels(&cull.trees)),
+                ("ranked", Resource::Texels(&self.ranked)),
+                ("species", Resource::Buffer(&forest.species.table)),
+                ("bases", Resource::Texels(&forest.species.bases)),
+                ("seen", Resource::Texels(&self.seen)),
+                ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
+                ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
+                ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
+                ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+            ];
+            pass.bind(&self.shade, &with(&all, &shown));
             pass.push(&self.parameters);
             pass.dispatch([across, down, 1]);
         });

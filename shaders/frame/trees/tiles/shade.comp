@@ -1,5 +1,5 @@
-// Light on the trees that samples see: radiance.
+// Light on the trees that samples see: radiance, or a view mode.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
-#include "frame/trees/tiles/shade_radiance.glsl"
+#include "frame/trees/tiles/shade.glsl"

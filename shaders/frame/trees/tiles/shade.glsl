@@ -12,6 +12,9 @@
 #include "frame/trees/zfield_light.glsl"
 #include "frame/camera.glsl"
 #include "frame/trees/tiles/box.glsl"
+#include "frame/view_mode.glsl"
+#include "frame/trees/zfield_mode.glsl"
+#include "frame/shown.glsl"
 
 layout(local_size_x = 8) in;
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
@@ -33,15 +36,8 @@ layout(constant_id = 4) const uint TRANSFER_BANDS = 0u;
 
 const uint MOST_ITEMS = TILE_SIDE * 8u; // trees of a column: one a sample, of up to eight
 
-struct Shaded {
-    TreeParts parts;
-    uint species;   // counted from 1
-    uint draw;
-    uint cascade;
-};
-
-// A tree's light where a pixel sees it; `offset` is the pixel's from the image's centre.
-Shaded shade(uint rank, vec2 offset) {
+// What a tree shows to a pixel that sees it, and how deep; `offset` is the pixel's from the image's centre.
+Shown shade(uint rank, vec2 offset, out float depth) {
     View v = view.v;
     uint who = texelFetch(ranked, int(rank)).x, draw = who >> 30u;
     Tree t = fetch_tree(trees, who & 0x3fffffffu);
@@ -69,6 +65,8 @@ Shaded shade(uint rank, vec2 offset) {
     float s = clamp(surface.s, -1e3, 0.999);
     vec3 found = mix(point, c, s), toward = to_tree(TreePlane(vec3(1.0), plane.turn, plane.w, plane.far, plane.right, plane.up, vec4(0.0)), v.sun_direction);
     vec3 metre = toward / plane.half_extent;
+    vec3 world = world_from_tree(t, kind, found);
+    depth = min(v.clip_from_world[3].z / max(dot(camera.forward, world), 1e-6), 1.0);
     LightRay ray;
     for (int k = 0; k < 3; k++) {
         ViewBasis b = fetch_basis(bases, uint(light_layers[k]));
@@ -82,7 +80,7 @@ Shaded shade(uint rank, vec2 offset) {
     for (uint k = 1u; k < MAX_CASCADES; k++) {
         if (k == cascade) shadow = v.cascade_from_world[k];
     }
-    ray.entry = (shadow * vec4(world_from_tree(t, kind, found), 1.0)).xyz;
+    ray.entry = (shadow * vec4(world, 1.0)).xyz;
     ray.deeper = (shadow * vec4(v.sun_direction, 0.0)).z;
     // A texel spans crowns whose backs slope by about one: half a texel towards the sun, or neighbours shade each other's rims.
     ray.entry.z += 0.5 * v.cascade_texel[cascade] * ray.deeper;
@@ -90,13 +88,20 @@ Shaded shade(uint rank, vec2 offset) {
     TreeLight light = TreeLight(t.sun, t.sky, t.mean_sun, t.mean_sky, t.mean_lit, t.own, kind.bark, kind.crown_base,
                                 plane.half_extent.z, t.hole, kind.leaf_shadow * root, kind.extinction * phase_angle / t.scale, toward,
                                 transfer_reach(root), t.cascade);
-    Shaded shaded;
-    shaded.parts = tree_light(views, shadow_map, transfer_1, transfer_2, light, surface, at, to, layers, below, t.mip, magnified, s,
-                              found.z, ray, LightQuality(HAS_SUN, LIGHT_ITERATIONS, TRANSFER_BANDS));
-    shaded.species = t.species + 1u;
-    shaded.draw = draw;
-    shaded.cascade = t.cascade;
-    return shaded;
+    TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, light, surface, at, to, layers, below, t.mip, magnified,
+                                 s, found.z, ray, LightQuality(HAS_SUN, LIGHT_ITERATIONS, TRANSFER_BANDS));
+#ifdef LAYERS
+    return Shown(vec4(parts.sun, 1.0), vec4(parts.sky, 1.0), vec4(0.0, 0.0, parts.lit, 1.0 - parts.lit));
+#else
+    if (VIEW_MODE != 0u) return Shown(vec4(tree_mode(draw, t.cascade, parts.lit), 1.0));
+    return Shown(vec4(parts.sun + parts.sky, 1.0));
+#endif
+}
+
+// Species of a tree.
+uint species_of(uint rank) {
+    uint tree = texelFetch(ranked, int(rank)).x & 0x3fffffffu;
+    return texelFetch(trees, int(tree) * 8 + 1).z;
 }
 
 shared uint ranks[8u * MOST_ITEMS];  // the trees of each column
@@ -143,4 +148,46 @@ uint item_slot(uint i) {
 // The pixel of an item, from the image's centre.
 vec2 item_offset(uvec2 corner, uint slot) {
     return vec2(corner + uvec2(slot / MOST_ITEMS, places[slot] >> 8u)) + 0.5 - 0.5 * vec2(p.size);
+}
+
+shared Shown shown[8u * MOST_ITEMS];
+#ifdef LAYERS
+shared float depths[8u * MOST_ITEMS];
+#endif
+
+void main() {
+    uvec2 corner = gl_WorkGroupID.xy * TILE_SIDE;
+    uint column = gl_LocalInvocationIndex;
+    list_items(corner, column);
+    barrier();
+    uint total = 0u;
+    for (uint c = 0u; c < 8u; c++) total += counts[c];
+    for (uint i = column; i < total; i += 8u) {
+        uint slot = item_slot(i);
+        float depth;
+        shown[slot] = shade(ranks[slot], item_offset(corner, slot), depth);
+#ifdef LAYERS
+        depths[slot] = depth;
+#endif
+    }
+    barrier();
+    uint item = column * MOST_ITEMS, end = item + counts[column];
+    for (uint row = 0u; row < TILE_SIDE; row++) {
+        Shown all = shown_nothing();
+        uint covered = 0u, first = ~0u;
+        while (item < end && places[item] >> 8u == row) {
+            uint samples = places[item] & 0xffu;
+            all = sum(all, scaled(shown[item], float(bitCount(samples)) / float(SAMPLES)));
+            first = (samples & 1u) != 0u ? item : first;
+            covered |= samples;
+            item++;
+        }
+        ivec2 pixel = ivec2(corner + uvec2(column, row));
+        // What the others of its samples see is there. Where every sample sees a tree, nothing is yet.
+        if (covered != 0u && covered + 1u != 1u << SAMPLES) all = sum(all, load_pixel(pixel));
+        if (covered != 0u) store_pixel(pixel, all);
+#ifdef LAYERS
+        if (first != ~0u) store_first(pixel, species_of(ranks[first]) + 1u, depths[first]);
+#endif
+    }
 }
