@@ -24,8 +24,8 @@ layout(std430, binding = 7) writeonly buffer Trees { Tree items[]; } trees;
 layout(std430, binding = 8) writeonly buffer Lists { uint items[]; } lists;
 layout(std430, binding = 9) readonly buffer Totals { uint items[]; } totals;
 layout(push_constant) uniform Push { CullParameters p; };
-layout(constant_id = 0) const int RINGS = 9;
-layout(constant_id = 1) const float RESOLUTION = 256.0;
+layout(constant_id = 0) const int VIEW_RINGS = 9;
+layout(constant_id = 1) const float VIEW_RESOLUTION = 256.0;
 layout(constant_id = 2) const float TABLE_ANGLES = 16.0;
 layout(constant_id = 3) const float TABLE_DENSITIES = 8.0;
 layout(constant_id = 4) const bool PAIR_TABLES = true; // the sun's average light is known, and has a share
@@ -44,7 +44,7 @@ uint lookup(vec3 w, out vec2 weights) {
     uvec3 layers;
     vec3 all;
     bool below = w.z < 0.0;
-    view_lookup(below ? -w : w, RINGS, layers, all);
+    view_lookup(below ? -w : w, VIEW_RINGS, layers, all);
     weights = all.xy;
     return layers.x | layers.y << 10u | layers.z << 20u | (below ? 1u << 31u : 0u);
 }
@@ -90,8 +90,8 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     // One integer mip a tree: texels of 0.35 to 0.7 pixels on the wider side of the box, because bilinear filters are two
     // texels wide. A level coarser blurs neighbouring crowns into each other's gaps, and more ground shows than should.
     float extent = 2.0 * max(kind.scale_to_metres.x, kind.scale_to_metres.z) * s.scale;
-    float texels_per_pixel = RESOLUTION * distance / (extent * v.pixels_at_1m);
-    t.mip = clamp(floor(log2(max(texels_per_pixel, 1e-6)) - 0.5), 0.0, log2(RESOLUTION));
+    float texels_per_pixel = VIEW_RESOLUTION * distance / (extent * v.pixels_at_1m);
+    t.mip = clamp(floor(log2(max(texels_per_pixel, 1e-6)) - 0.5), 0.0, log2(VIEW_RESOLUTION));
     // Trees end smoothly at their range (BN12, section 7), and where the camera enters the crown.
     float reach = distance / kind.range;
     vec3 eye = (back * -centre) / (kind.scale_to_metres * s.scale);

@@ -7,7 +7,7 @@ layout(location = 5) flat in uint cover_layer;  // first layer
 
 layout(binding = 6) uniform sampler2DArray cover_tiles;
 layout(constant_id = 0) const uint COVER_CHANNELS = 0u; // of a tile: 2 or four a layer; 0: no trees
-layout(constant_id = 1) const float COVER_SIDE = 256.0;
+layout(constant_id = 1) const uint COVER_SIDE = 256u;        // texels along a side of a tile
 
 struct Cover {
     float texel;                      // of the level of detail, in texels of mip 0
@@ -21,7 +21,7 @@ Cover cover() {
     Cover c;
     for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] = vec4(0.0);
     vec2 dx = dFdx(cover_at.xy), dy = dFdy(cover_at.xy);
-    float footprint = 0.5 * log2(max(max(dot(dx, dx), dot(dy, dy)), 1e-30)) + log2(COVER_SIDE) + view.v.footprint;
+    float footprint = 0.5 * log2(max(max(dot(dx, dx), dot(dy, dy)), 1e-30)) + log2(float(COVER_SIDE)) + view.v.footprint;
     float lod = max(footprint, cover_at.z);
     for (uint g = 0u; 4u * g < COVER_CHANNELS; g++) {
         c.channels[g] = textureLod(cover_tiles, vec3(cover_at.xy, float(cover_layer + g)), min(lod, 3.0));

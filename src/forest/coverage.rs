@@ -130,7 +130,8 @@ impl CoverageData {
         let least = LEAST_TEXEL.max(LEAST_RADIUS_PART * smallest);
         let inner = f64::from(size - 2 * COVER_GUTTER);
         let finest = (0..tree.levels()).rev().find(|l| tree.side(*l) / inner >= least).unwrap_or(0);
-        let constants = [(0, size), (1, scene.species.len() as u32), (2, species.map_count)];
+        let of_discs = [("COVER_SIDE", size), ("DENSITY_MAPS", species.map_count)];
+        let of_tiles = [&of_discs[..], &[("SPECIES_COUNT", scene.species.len() as u32)]].concat();
         let texels = u64::from(size) * u64::from(size);
         // Zeros, as the production leaves them.
         let sums =
@@ -151,13 +152,13 @@ impl CoverageData {
             quads: gpu.buffer("coverage quads", 0)?,
             splats: gpu.buffer("coverage splats", 0)?,
             jobs: gpu.buffer("coverage jobs", 0)?,
-            splat: gpu.compute(&shaders::FOREST_COVERAGE_SPLAT_COMP, &constants)?,
+            splat: gpu.compute(&shaders::FOREST_COVERAGE_SPLAT_COMP, &of_discs)?,
             resolve: gpu.compute(
                 match plan.cover_channels {
                     2 => &shaders::FOREST_COVERAGE_RESOLVE_PAIR_COMP,
                     _ => &shaders::FOREST_COVERAGE_RESOLVE_COMP,
                 },
-                &constants,
+                &of_tiles,
             )?,
             finest,
             disc: if weight > 0.0 { area / weight } else { 0.0 },

@@ -71,11 +71,11 @@ impl CullData {
         let trees = u64::from(plan.tree_capacity);
         let float = |n: u32| (n as f32).to_bits();
         let constants = [
-            (0, scene.settings.view_rings),
-            (1, float(scene.settings.view_resolution)),
-            (2, float(tables.angles)),
-            (3, float(tables.densities)),
-            (4, u32::from(plan.pair_tables)),
+            ("VIEW_RINGS", scene.settings.view_rings),
+            ("VIEW_RESOLUTION", float(scene.settings.view_resolution)),
+            ("TABLE_ANGLES", float(tables.angles)),
+            ("TABLE_DENSITIES", float(tables.densities)),
+            ("PAIR_TABLES", u32::from(plan.pair_tables)),
         ];
         Ok(CullData {
             trees: gpu.buffer("trees", trees * size_of::<Tree>() as u64)?,

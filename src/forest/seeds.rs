@@ -82,7 +82,7 @@ impl SeedData {
             species_count: gpu.buffer_with("species count", &[scene.species.len() as u32])?,
             listed_ranges,
             cache: SlotCache::new(plan.seed_regions),
-            program: gpu.compute(&shaders::FOREST_SEEDS_COMP, &[(2, maps)])?,
+            program: gpu.compute(&shaders::FOREST_SEEDS_COMP, &[("DENSITY_MAPS", maps)])?,
             parameters: SeedParameters {
                 extent: scene.terrain.extent.map(|e| e as f32),
                 quad_side: plan.quad_side as f32,

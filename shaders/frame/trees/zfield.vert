@@ -15,8 +15,8 @@ layout(std430, binding = 2) readonly buffer Lists { uint items[]; } lists;
 layout(std140, binding = 3) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
 layout(std430, binding = 4) readonly buffer Bases { ViewBasis items[]; } bases;
 layout(std430, binding = 5) readonly buffer Masks { uvec4 items[]; } masks;
-layout(constant_id = 0) const int RINGS = 9;
-layout(constant_id = 1) const float RESOLUTION = 256.0;
+layout(constant_id = 0) const int VIEW_RINGS = 9;
+layout(constant_id = 1) const float VIEW_RESOLUTION = 256.0;
 layout(constant_id = 2) const uint MASK_ROWS = 12u;
 
 layout(location = 0) out vec4 view_p[3];        // in the three views; w of the first: height in the tree
@@ -56,10 +56,10 @@ void main() {
     frame_across(w, right, up);
     float reach = length(w.xy) + abs(w.z);
     vec4 extent = tree_bounds(bases.items[uint(layers.x)].bounds, bases.items[uint(layers.y)].bounds,
-                              bases.items[uint(layers.z)].bounds, w, below, RINGS);
+                              bases.items[uint(layers.z)].bounds, w, below, VIEW_RINGS);
     extent *= far / max(far - reach, 0.1 * far);
     // Half a texel of the mip in use, so that bilinear edges are not cut.
-    vec2 margin = exp2(t.mip) / RESOLUTION * vec2(1.0, reach);
+    vec2 margin = exp2(t.mip) / VIEW_RESOLUTION * vec2(1.0, reach);
     uint corner = gl_VertexIndex & 3u;
     vec3 p = right * ((corner & 1u) == 0u ? extent.x - margin.x : extent.y + margin.x) +
              up * ((corner & 2u) == 0u ? extent.z - margin.y : extent.w + margin.y);

@@ -26,11 +26,11 @@ impl ShaderMap {
             program: gpu.compute(
                 &shaders::FRAME_TREES_SHADER_MAP_COMP,
                 &[
-                    (0, plan.cover_channels),
-                    (2, forest.species.count),
-                    (3, float(forest.tables.angles)),
-                    (4, float(forest.tables.densities)),
-                    (5, u32::from(plan.pair_tables)),
+                    ("COVER_CHANNELS", plan.cover_channels),
+                    ("SPECIES_COUNT", forest.species.count),
+                    ("TABLE_ANGLES", float(forest.tables.angles)),
+                    ("TABLE_DENSITIES", float(forest.tables.densities)),
+                    ("PAIR_TABLES", u32::from(plan.pair_tables)),
                 ],
             )?,
         })

@@ -111,20 +111,25 @@ impl TreeTiles {
             scan: gpu.compute(&shaders::FRAME_TREES_TILES_SCAN_COMP, &[])?,
             sight: gpu.compute(
                 &shaders::FRAME_TREES_TILES_SIGHT_COMP,
-                &[(0, s.view_rings), (1, resolution), (2, mask_rows), (3, plan.samples)],
+                &[
+                    ("VIEW_RINGS", s.view_rings),
+                    ("VIEW_RESOLUTION", resolution),
+                    ("MASK_ROWS", mask_rows),
+                    ("SAMPLES", plan.samples),
+                ],
             )?,
             entries_count: gpu.compute(&shaders::FRAME_TREES_TILES_ENTRIES_COUNT_COMP, &[])?,
             entries_fill: gpu.compute(&shaders::FRAME_TREES_TILES_ENTRIES_FILL_COMP, &[])?,
-            see: gpu.compute(see, &[(0, plan.samples), (1, before)])?,
+            see: gpu.compute(see, &[("SAMPLES", plan.samples), ("ESTIMATES", before)])?,
             shade: gpu.compute(
                 shade,
                 &[
-                    (0, plan.samples),
-                    (1, before),
+                    ("SAMPLES", plan.samples),
+                    ("ESTIMATES", before),
                     // Without sun no ray goes to it.
-                    (2, if plan.cascades > 0 { s.light_iterations } else { 0 }),
-                    (3, u32::from(plan.cascades > 0)),
-                    (4, plan.transfer_bands),
+                    ("LIGHT_ITERATIONS", if plan.cascades > 0 { s.light_iterations } else { 0 }),
+                    ("HAS_SUN", u32::from(plan.cascades > 0)),
+                    ("TRANSFER_BANDS", plan.transfer_bands),
                 ],
             )?,
         })

@@ -41,7 +41,7 @@ pub enum Function {
 /// [`crate::Error::Device`].
 pub fn evaluate(gpu: &Gpu, function: Function, arguments: &[Arguments]) -> Result<Vec<Words>> {
     let inputs = gpu.buffer_with("probe inputs", arguments)?;
-    let (shader, constants) = (&shaders::PROBE_PHYSICS_COMP, [(0, function as u32)]);
+    let (shader, constants) = (&shaders::PROBE_PHYSICS_COMP, [("FUNCTION", function as u32)]);
     dispatch(gpu, shader, &constants, &[("inputs", Resource::Buffer(&inputs))], arguments.len(), &[])
 }
 
@@ -52,7 +52,7 @@ pub fn evaluate(gpu: &Gpu, function: Function, arguments: &[Arguments]) -> Resul
 pub fn dispatch<T: Pod>(
     gpu: &Gpu,
     shader: &'static Shader,
-    constants: &[(u32, u32)],
+    constants: &[(&str, u32)],
     resources: &[(&str, Resource)],
     count: usize,
     more: &[u32],

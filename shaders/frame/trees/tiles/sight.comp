@@ -23,8 +23,8 @@ layout(std430, binding = 10) writeonly buffer Records { uvec4 items[]; } records
 layout(std430, binding = 11) writeonly buffer Boxes { uvec2 items[]; } boxes;
 layout(std430, binding = 12) writeonly buffer Spans { uint items[]; } spans;
 layout(push_constant) uniform Push { TileParameters p; };
-layout(constant_id = 0) const int RINGS = 9;
-layout(constant_id = 1) const float RESOLUTION = 256.0;
+layout(constant_id = 0) const int VIEW_RINGS = 9;
+layout(constant_id = 1) const float VIEW_RESOLUTION = 256.0;
 layout(constant_id = 2) const uint MASK_ROWS = 12u;
 layout(constant_id = 3) const uint SAMPLES = 4u;
 
@@ -53,7 +53,7 @@ void main() {
     TreePlane plane = tree_plane(t, kind);
     vec3 layers = unpack_layers(t.view_layers, kind.first_layer);
     plane.extent = quad_extent(plane, t.mip, bases.items[uint(layers.x)].bounds, bases.items[uint(layers.y)].bounds,
-                               bases.items[uint(layers.z)].bounds, t.view_layers >> 31u != 0u, RINGS, RESOLUTION);
+                               bases.items[uint(layers.z)].bounds, t.view_layers >> 31u != 0u, VIEW_RINGS, VIEW_RESOLUTION);
     Camera camera = camera_of(v, vec2(p.size));
 
     Sight s;
