@@ -56,17 +56,17 @@ void average_light(inout Tree t, Species kind, vec3 to_camera, vec3 ground, floa
                                  TABLE_DENSITIES, PAIR_TABLES);
     float lit = nu * sun_facing(view.v.sun_direction, ground);
     t.own = 1.0 - nu;
-    t.mean_sun = (lit * f.transfer) * t.sun * (f.sun.x + f.sun.y * kind.bark);
+    t.mean_sun = (lit * f.transfer) * t.sun * (f.sun.x + f.sun.y * kind.bark_ratio);
     t.mean_lit = lit * (f.sun.x + f.sun.y);
-    t.mean_sky = nu * t.sky * (f.sky.x + f.sky.y * kind.bark);
+    t.mean_sky = nu * t.sky * (f.sky.x + f.sky.y * kind.bark_ratio);
 }
 
 // Opacity factor of a tree: faded out at its range, or on a silhouette, at the farther one.
-float range_fade(SeedQuad q, Seed s, vec3 centre, Species kind, float reach) {
-    float u = unit(hash(s.identity ^ HASH_FADE)), near = tree_fade(reach, u), height = tree_height(kind, s.scale);
-    bool asked = near < 1.0 && view.v.silhouette_reach > 1.0;
+float range_fade(SeedQuad q, Seed s, vec3 centre, Species kind, float relative) {
+    float u = unit(hash(s.identity ^ HASH_FADE)), near = tree_fade(relative, u), height = tree_height(kind, s.scale);
+    bool asked = near < 1.0 && view.v.silhouette_ratio > 1.0;
     float clearance = silhouette(view.v, q, s, centre, height, heights, asked);
-    return max(near, silhouette_opacity(clearance, height) * tree_fade(reach / view.v.silhouette_reach, u));
+    return max(near, silhouette_opacity(clearance, height) * tree_fade(relative / view.v.silhouette_ratio, u));
 }
 
 Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
@@ -93,10 +93,10 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     float texels_per_pixel = VIEW_RESOLUTION * distance / (extent * v.pixels_at_1m);
     t.mip = clamp(floor(log2(max(texels_per_pixel, 1e-6)) - 0.5), 0.0, log2(VIEW_RESOLUTION));
     // Trees end smoothly at their range (BN12, section 7), and where the camera enters the crown.
-    float reach = distance / kind.range;
+    float relative = distance / kind.range;
     vec3 eye = (back * -centre) / (kind.scale_to_metres * s.scale);
     float inside = max(length(eye.xy), abs(eye.z));
-    t.fade = range_fade(q, s, centre, kind, reach) * smoothstep(1.05, 1.35, inside);
+    t.fade = range_fade(q, s, centre, kind, relative) * smoothstep(1.05, 1.35, inside);
     vec3 ground = normalize(vec3(-unpackHalf2x16(s.slope), 1.0));
     float density = unpackHalf2x16(s.species_density).y;
     density *= density;
@@ -107,7 +107,7 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     // rho / 2 of a leaf that the upper hemisphere lights, times the visibility of the sky above a slope (BN12, eq. 9).
     t.sky = tint * kind.albedo * (0.25 * (1.0 + ground.z)) * v.sky_radiance;
     t.hole = density * kind.hole;
-    average_light(t, kind, to_camera, ground, density, converged(reach, v.convergence));
+    average_light(t, kind, to_camera, ground, density, converged(relative, v.convergence));
     // From above more of the leaves' upper sides is seen, which the sky lights. The tables' average knows.
     t.sky *= max(kind.sky.x + kind.sky.y * to_camera.z, 0.0);
     t.cascade = cascade_at(v.cascade_far, v.cascade_count, distance);

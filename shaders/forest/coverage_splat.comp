@@ -49,8 +49,8 @@ void main() {
     float texels_per_metre = float(tile.fine) / tile.texel;
     // Only Wang tiles with points from which a disc reaches the tile.
     float last = float(p.tiles_per_side) - 1.0, across = float(COVER_SIDE) * tile.texel;
-    vec2 low = clamp(floor((-splat.corner - c.reach) / p.tile_side), 0.0, last + 1.0);
-    vec2 high = clamp(floor((across - splat.corner + c.reach) / p.tile_side), -1.0, last);
+    vec2 low = clamp(floor((-splat.corner - c.largest_radius) / p.tile_side), 0.0, last + 1.0);
+    vec2 high = clamp(floor((across - splat.corner + c.largest_radius) / p.tile_side), -1.0, last);
     uvec2 from = uvec2(low), size = uvec2(max(high - low + 1.0, 0.0));
     uint points = size.x * size.y * p.points_per_tile, total = points + q.position_count;
     uint pattern_count = p.tiles_per_side * p.tiles_per_side * p.points_per_tile;

@@ -242,15 +242,15 @@ fn light_transfer(gpu: &Gpu) -> Result<Finding> {
         let bands = [transfer::decode(bytes(0)), transfer::decode(bytes(4))];
         // A coefficient is a difference of 8 and 4 at most, 12 roundings of 1; eight of them times terms of at most 1, and
         // seven sums of at most 32.
-        // The reach's exponential has 4 ulp of 1, times 16 that coefficients make at most.
+        // The strength's exponential has 4 ulp of 1, times 16 that coefficients make at most.
         let error = (8.0 * 12.0 + 7.0 * 32.0 + 16.0 * 12.0) * EPS;
-        vec![(transfer::transfer(&bands, [x[8], x[9], x[10]], transfer::reach(x[11])), error)]
+        vec![(transfer::transfer(&bands, [x[8], x[9], x[10]], transfer::strength(x[11])), error)]
     })
 }
 
 fn hand_over(gpu: &Gpu) -> Result<Finding> {
-    let reaches = (0..=120).map(|k| k as f32 / 100.0);
-    let inputs: Vec<Vec<f32>> = reaches
+    let relative = (0..=120).map(|k| k as f32 / 100.0);
+    let inputs: Vec<Vec<f32>> = relative
         .flat_map(|r| [0.0f32, 0.4, 0.9].map(|x| vec![r, 0.45, x, 0.0, 3.0 * r, x, 1.0 - x, 0.5 + 0.4 * x]))
         .collect();
     compare(gpu, Function::Handover, &inputs, |x| {
