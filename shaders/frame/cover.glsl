@@ -1,13 +1,17 @@
 // What trees cover of the ground in top view, and how densely each species stands (BN12, section 4): a lookup in the
 // coverage tile of the terrain quad. Where discs are too small to tell, coverage is what the tables expect.
 
-layout(location = 3) in vec3 cover_at;          // texture coordinates in the tile, and least mip level
-layout(location = 4) flat in float cover_disc;  // log2 of the mean disc area in texels of mip 0
-layout(location = 5) flat in uint cover_layer;  // first layer
-
 layout(binding = 6) uniform sampler2DArray cover_tiles;
 layout(constant_id = 0) const uint COVER_CHANNELS = 0u; // of a tile: 2 or four a layer; 0: no trees
 layout(constant_id = 1) const uint COVER_SIDE = 256u;        // texels along a side of a tile
+
+// A place in a coverage tile.
+struct CoverPoint {
+    vec3 at;          // texture coordinates in the tile, and least mip level
+    float disc;       // log2 of the mean disc area in texels of mip 0
+    uint layer;       // first layer
+    float footprint;  // log2 of the texture coordinates that a pixel spans along its longer side
+};
 
 struct Cover {
     float texel;                      // of the level of detail, in texels of mip 0
@@ -17,19 +21,21 @@ struct Cover {
 
 // The tile's level of detail follows the pixel's footprint. Where a quad morphs to its parent's shape the least level
 // rises to 1, where the parent's tile takes over at its level 0 with the same texels: nothing changes when quads do.
-Cover cover() {
+Cover cover(CoverPoint place) {
     Cover c;
     for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] = vec4(0.0);
-    vec2 dx = dFdx(cover_at.xy), dy = dFdy(cover_at.xy);
-    float footprint = 0.5 * log2(max(max(dot(dx, dx), dot(dy, dy)), 1e-30)) + log2(float(COVER_SIDE)) + view.v.footprint;
-    float lod = max(footprint, cover_at.z);
+    float footprint = place.footprint + log2(float(COVER_SIDE)) + view.v.footprint;
+    float lod = max(footprint, place.at.z);
     for (uint g = 0u; 4u * g < COVER_CHANNELS; g++) {
-        c.channels[g] = textureLod(cover_tiles, vec3(cover_at.xy, float(cover_layer + g)), min(lod, 3.0));
+        c.channels[g] = textureLod(cover_tiles, vec3(place.at.xy, float(place.layer + g)), min(lod, 3.0));
     }
     // Missing channels read 0, and a missing fourth 1.
     if (COVER_CHANNELS == 2u) c.channels[0].w = 0.0;
     c.texel = exp2(lod);
     // Discs fade where their mean is 1/4 to 1/16 of a texel of this level, and where levels end.
-    c.resolved = clamp(0.5 * (cover_disc + 4.0) - lod, 0.0, 1.0) * clamp(3.5 - lod, 0.0, 1.0);
+    c.resolved = clamp(0.5 * (place.disc + 4.0) - lod, 0.0, 1.0) * clamp(3.5 - lod, 0.0, 1.0);
     return c;
 }
+
+// What a pixel spans, from how far its right and lower neighbours' texture coordinates are.
+float cover_footprint(vec2 dx, vec2 dy) { return 0.5 * log2(max(max(dot(dx, dx), dot(dy, dy)), 1e-30)); }

@@ -2,14 +2,6 @@
 #include "physics/light.glsl"
 #include "physics/shadow.glsl"
 
-layout(location = 0) in vec3 position;
-layout(location = 1) in vec2 slope_at;
-layout(location = 2) flat in uint layer;
-layout(location = 6) centroid in vec4 tree_sun;
-layout(location = 7) centroid in vec4 tree_sky;
-layout(location = 8) centroid in vec4 paths;
-layout(location = 9) centroid in vec2 vertical;
-
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 3) uniform sampler2DArray slope_tiles;
 layout(binding = 4) uniform sampler2DArray albedo;
@@ -22,6 +14,18 @@ layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
 layout(constant_id = 5) const bool HAS_SUN = true;
 layout(constant_id = 6) const bool SHADOWED = true; // within reach of a cascade
 
+// A point of the ground in the picture.
+struct GroundPoint {
+    vec3 position;      // from the camera, m
+    vec2 slope_at;      // texture coordinates in the quad's tile of slopes
+    uint layer;         // of that tile
+    CoverPoint cover;
+    vec4 tree_sun;      // radiance of the shader-map's trees from the sun; w: their lit fraction
+    vec4 tree_sky;      // from the sky; w: nu
+    vec4 paths;         // over, seen, joint; w: coverage where ground is seen
+    vec2 vertical;      // sky, gap
+};
+
 struct GroundLight {
     vec3 sun, sky;  // parts of the radiance
     float trees;    // share of the pixel that is trees of the shader-map
@@ -30,7 +34,7 @@ struct GroundLight {
 };
 
 // How much of the sun the shadow maps leave.
-float shadow_maps(vec3 n, float cosine, float distance) {
+float shadow_maps(vec3 position, vec3 n, float cosine, float distance) {
     if (!SHADOWED) return 1.0;
     uint c = cascade_at(view.v.cascade_far, view.v.cascade_count, distance);
     if (c == MAX_CASCADES) return 1.0;
@@ -43,32 +47,33 @@ float shadow_maps(vec3 n, float cosine, float distance) {
 }
 
 // Unit normal of the ground.
-vec3 ground_normal() { return normalize(vec3(-textureLod(slope_tiles, vec3(slope_at, float(layer)), 0.0).rg, 1.0)); }
+vec3 ground_normal(vec2 slope_at, uint layer) {
+    return normalize(vec3(-textureLod(slope_tiles, vec3(slope_at, float(layer)), 0.0).rg, 1.0));
+}
 
 // Ground and, where trees are not drawn one by one, the trees on it (BN12, eq. 11-13 and 24-27).
-GroundLight ground_light() {
-    vec3 n = ground_normal();
-    vec2 world = (vec2(view.v.grid_camera) * p.step + view.v.grid_offset + position.xy) / p.extent;
+GroundLight ground_light(GroundPoint at, vec3 n) {
+    vec2 world = (vec2(view.v.grid_camera) * p.step + view.v.grid_offset + at.position.xy) / p.extent;
     vec3 reflectance = textureLod(albedo, vec3(world.x, 1.0 - world.y, 0.0), 0.0).rgb;
-    float distance = length(position);
+    float distance = length(at.position);
     float cosine = max(dot(n, view.v.sun_direction), 0.0);
-    Cover c = cover();
+    Cover c = cover(at.cover);
     // What the nodes know per thickness, times the pixel's own.
     float thickness = total_thickness(c.channels);
-    float expected = 1.0 - exp(-thickness * vertical.y);
+    float expected = 1.0 - exp(-thickness * at.vertical.y);
     // Interpolation rounds beyond the values at the vertices.
-    float nu = thickness > 0.0 ? clamp(tree_sky.w, 0.0, 1.0) : 0.0, trees_lit = clamp(tree_sun.w, 0.0, 1.0);
-    float ground_lit = exp(thickness * min(paths.y - paths.z, 0.0));
+    float nu = thickness > 0.0 ? clamp(at.tree_sky.w, 0.0, 1.0) : 0.0, trees_lit = clamp(at.tree_sun.w, 0.0, 1.0);
+    float ground_lit = exp(thickness * min(at.paths.y - at.paths.z, 0.0));
     GroundLight g;
     g.coverage = mix(expected, c.channels[0].x, c.resolved);
-    float lit = HAS_SUN ? mix(shadow_maps(n, cosine, distance), ground_lit, nu) : 0.0;
+    float lit = HAS_SUN ? mix(shadow_maps(at.position, n, cosine, distance), ground_lit, nu) : 0.0;
     float contrast = mix(ground_contrast(g.coverage, expected, view.v.ground_contrast),
-                         ground_contrast(paths.w, expected, view.v.ground_contrast), nu);
-    float open = open_ground(thickness * paths.x, paths.x / max(paths.y, 1e-9), g.coverage, expected);
+                         ground_contrast(at.paths.w, expected, view.v.ground_contrast), nu);
+    float open = open_ground(thickness * at.paths.x, at.paths.x / max(at.paths.y, 1e-9), g.coverage, expected);
     vec3 sun = reflectance * (cosine * lit / PI) * view.v.sun_irradiance;
-    vec3 sky = reflectance * (0.5 * (1.0 + n.z) * exp(-thickness * vertical.x) * contrast) * view.v.sky_radiance;
-    g.sun = mix(max(tree_sun.rgb, 0.0), sun, open);
-    g.sky = mix(max(tree_sky.rgb, 0.0), sky, open);
+    vec3 sky = reflectance * (0.5 * (1.0 + n.z) * exp(-thickness * at.vertical.x) * contrast) * view.v.sky_radiance;
+    g.sun = mix(max(at.tree_sun.rgb, 0.0), sun, open);
+    g.sky = mix(max(at.tree_sky.rgb, 0.0), sky, open);
     g.trees = 1.0 - open;
     if (cosine <= 0.0) lit = 0.0;
     g.fractions = vec4(open * vec2(lit, 1.0 - lit), (1.0 - open) * vec2(trees_lit, 1.0 - trees_lit));

@@ -12,7 +12,7 @@ use crate::gpu::interface::{
     CAMERA_DRAWS, CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, FADE_FIRST, FADE_RATE, FADE_SPREAD,
     MAX_CASCADES, Seed, SeedQuad, Species, TREE_LISTS, Tree, View,
 };
-use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
+use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders, vk};
 use crate::land::silhouette::clearance;
 use crate::physics::handover;
 use crate::physics::hash::{HASH_FADE, hash, unit};
@@ -83,7 +83,11 @@ impl CullData {
             ("PAIR_TABLES", u32::from(plan.pair_tables)),
         ];
         Ok(CullData {
-            trees: gpu.buffer("trees", trees * size_of::<Tree>() as u64)?,
+            trees: gpu.texel_buffer(
+                "trees",
+                trees * size_of::<Tree>() as u64,
+                (vk::Format::R32G32B32A32_UINT, 16),
+            )?,
             lists: gpu.buffer("tree lists", trees * 4 * u64::from(1 + MAX_CASCADES))?,
             commands: gpu.buffer(
                 "tree draws",

@@ -102,7 +102,13 @@ impl SpeciesData {
             count: scene.species.len() as u32,
             views: texels,
             transfer,
-            bases: gpu.buffer_with("view bases", &bases)?,
+            bases: {
+                let bytes = size_of_val(bases.as_slice()) as u64;
+                let texels = (vk::Format::R32G32B32A32_SFLOAT, 16);
+                let buffer = gpu.texel_buffer("view bases", bytes, texels)?;
+                gpu.upload(&buffer, 0, &bases)?;
+                buffer
+            },
             mask_rows: masks.len() as u32,
             masks: gpu.buffer_with("sample masks", &masks)?,
             densities,

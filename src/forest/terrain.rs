@@ -112,9 +112,10 @@ impl TerrainData {
             height_tiles,
             slope_tiles,
             // Each quad once for the camera, once a cascade, once when fresh.
-            quads: gpu.buffer(
+            quads: gpu.texel_buffer(
                 "terrain quads",
                 6 * u64::from(plan.terrain_tiles) * size_of::<TerrainQuad>() as u64,
+                (vk::Format::R32G32B32A32_UINT, 16),
             )?,
             cache: SlotCache::new(plan.terrain_tiles),
             program: made.then(|| gpu.compute(&shaders::FOREST_TERRAIN_TILE_COMP, &[])).transpose()?,

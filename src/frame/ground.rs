@@ -1,9 +1,9 @@
 //! The terrain pass.
 
+use super::Forest;
 use super::shadows::TerrainPush;
 use super::targets::ImageTargets;
-use super::trees::shader_map::ShaderMap;
-use super::{Forest, NearTrees};
+use super::trees::shader_map::{NODE_TEXELS, ShaderMap};
 use crate::Result;
 use crate::forest::coverage;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
@@ -14,17 +14,57 @@ use crate::gpu::{
 };
 use crate::plan::{Plan, ViewMode};
 
-/// Draws the ground.
+/// Indices of the mesh of a quad of terrain.
+///
+/// # Errors
+/// [`crate::Error::Device`] when out of memory.
+pub fn mesh_indices(gpu: &Gpu) -> Result<Buffer> {
+    let side = TERRAIN_HEIGHTS;
+    let cells = (0..TERRAIN_CELLS * TERRAIN_CELLS).map(|k| (k % TERRAIN_CELLS) + side * (k / TERRAIN_CELLS));
+    // Diagonals run the same way at every level, so that a morphed quad is the coarser one exactly.
+    let indices: Vec<u32> = cells.flat_map(|k| [k, k + 1, k + side + 1, k, k + side + 1, k + side]).collect();
+    gpu.buffer_with("terrain indices", &indices)
+}
+
+/// What stands for the forest's data on the ground in scenes without trees.
+pub struct NoTrees {
+    coverage: Image,
+    nodes: Buffer,
+}
+
+impl NoTrees {
+    /// Allocates.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, plan: &Plan) -> Result<Self> {
+        Ok(NoTrees {
+            coverage: gpu.image(&ImageDesc {
+                name: "no coverage",
+                format: coverage::format(plan.cover_channels),
+                size: [1; 2],
+                layers: 1,
+                levels: 1,
+                samples: 1,
+                usage: vk::ImageUsageFlags::empty(),
+            })?,
+            nodes: gpu.texel_buffer("no nodes", size_of::<ForestNode>() as u64, NODE_TEXELS)?,
+        })
+    }
+
+    /// Coverage tiles and shader-map nodes of the forest, or these.
+    pub fn or<'a>(&'a self, forest: Option<(&'a Forest, &'a ShaderMap)>) -> (&'a Image, &'a Buffer) {
+        forest.map_or((&self.coverage, &self.nodes), |(f, map)| (&f.coverage.tiles, &map.nodes))
+    }
+}
+
+/// Draws the ground, every fragment lit.
 pub struct Ground {
-    /// Indices of a quad's mesh.
-    pub indices: Buffer,
     /// For quads that shadow cascades reach, if there are any.
     shadowed: Option<Program>,
     /// For those beyond: its shader looks into no shadow map.
     beyond: Program,
-    /// Stands for coverage tiles in scenes without trees.
-    no_coverage: Image,
-    no_nodes: Buffer,
+    none: NoTrees,
 }
 
 impl Ground {
@@ -34,12 +74,6 @@ impl Ground {
     /// [`crate::Error::Device`] if the device fails.
     pub fn new(gpu: &Gpu, plan: &Plan) -> Result<Self> {
         let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
-        let side = TERRAIN_HEIGHTS;
-        let cells =
-            (0..TERRAIN_CELLS * TERRAIN_CELLS).map(|k| (k % TERRAIN_CELLS) + side * (k / TERRAIN_CELLS));
-        // Diagonals run the same way at every level, so that a morphed quad is the coarser one exactly.
-        let indices: Vec<u32> =
-            cells.flat_map(|k| [k, k + 1, k + side + 1, k, k + side + 1, k + side]).collect();
         let program = |shadowed: bool| {
             let mut constants = vec![
                 ("COVER_CHANNELS", plan.cover_channels),
@@ -64,19 +98,9 @@ impl Ground {
             })
         };
         Ok(Ground {
-            indices: gpu.buffer_with("terrain indices", &indices)?,
             shadowed: (plan.cascades > 0).then(|| program(true)).transpose()?,
             beyond: program(false)?,
-            no_coverage: gpu.image(&ImageDesc {
-                name: "no coverage",
-                format: coverage::format(plan.cover_channels),
-                size: [1; 2],
-                layers: 1,
-                levels: 1,
-                samples: 1,
-                usage: vk::ImageUsageFlags::empty(),
-            })?,
-            no_nodes: gpu.buffer("no nodes", size_of::<ForestNode>() as u64)?,
+            none: NoTrees::new(gpu, plan)?,
         })
     }
 
@@ -86,6 +110,7 @@ impl Ground {
         &self,
         recorder: &mut Recorder,
         view: &Buffer,
+        indices: &Buffer,
         (terrain, draws): (&TerrainData, &TerrainDraws),
         forest: Option<(&Forest, &ShaderMap)>,
         shadow_map: &Image,
@@ -98,12 +123,11 @@ impl Ground {
             (_, 1) => sky.map(|c| [c[0], c[1], c[2], 0.0]),
             _ => sky.map(|_| [0.0; 4]),
         };
-        let last = forest.is_none_or(|(f, _)| f.near.as_ref().is_none_or(NearTrees::read_ground));
+        let last = forest.is_none_or(|(f, _)| f.near.is_none());
         let colors: Vec<_> =
             targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), last)).collect();
         let depth = Some(targets.depth.attachment(Some([0.0; 4]), last));
-        let (tiles, nodes) =
-            forest.map_or((&self.no_coverage, &self.no_nodes), |(f, map)| (&f.coverage.tiles, &map.nodes));
+        let (tiles, nodes) = self.none.or(forest);
         recorder.render("terrain", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
             let resources = [
                 ("view", Resource::Buffer(view)),
@@ -119,7 +143,7 @@ impl Ground {
             for (program, quads) in near.chain([(&self.beyond, draws.shadowed..draws.camera.1)]) {
                 pass.bind(program, &resources);
                 pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
-                pass.draw_indexed(&self.indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, quads);
+                pass.draw_indexed(indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, quads);
             }
         });
     }

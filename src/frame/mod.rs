@@ -1,6 +1,7 @@
 //! A frame: every pass in order, in [`Renderer::render`].
 
 pub mod ground;
+pub mod seen_ground;
 pub mod shadows;
 pub mod sky;
 pub mod targets;
@@ -28,6 +29,7 @@ use crate::plan::{Plan, Rasterizer};
 use crate::scene::{Camera, Scene, Sun};
 use crate::{Error, Result};
 use ground::Ground;
+use seen_ground::SeenGround;
 use shadows::Shadows;
 use sky::SkyPass;
 use targets::ImageTargets;
@@ -57,19 +59,20 @@ pub struct NearTrees {
     pass: TreePass,
 }
 
-impl NearTrees {
-    /// Whether they are put over the ground's finished picture, not drawn into its samples.
-    fn read_ground(&self) -> bool {
-        matches!(self.pass, TreePass::Tiles(_))
-    }
-}
-
 /// What draws them.
 enum TreePass {
     /// The graphics pipeline.
-    Graphics(Trees),
+    Graphics(Box<Trees>),
     /// Compute tiles.
     Tiles(Box<TreeTiles>),
+}
+
+/// What lights the ground.
+enum GroundPass {
+    /// Every fragment of its mesh, as it is drawn.
+    Drawn(Ground),
+    /// Once a pixel, where it is seen.
+    Seen(SeenGround),
 }
 
 /// Draws a scene as its plan says.
@@ -81,7 +84,8 @@ pub struct Renderer {
     view: Buffer,
     targets: ImageTargets,
     terrain: TerrainData,
-    ground: Ground,
+    terrain_indices: Buffer,
+    ground: GroundPass,
     shader_map: Option<ShaderMap>,
     shadows: Shadows,
     sky: Option<SkyPass>,
@@ -142,7 +146,7 @@ impl Renderer {
                     cull: CullData::new(gpu, &scene, &plan, &tables)?,
                     pass: match plan.rasterizer {
                         Rasterizer::Graphics => {
-                            TreePass::Graphics(Trees::new(gpu, &scene, &plan, species.mask_rows)?)
+                            TreePass::Graphics(Box::new(Trees::new(gpu, &scene, &plan, species.mask_rows)?))
                         }
                         Rasterizer::Tiles => {
                             TreePass::Tiles(Box::new(TreeTiles::new(gpu, &scene, &plan, species.mask_rows)?))
@@ -165,7 +169,11 @@ impl Renderer {
             view: gpu.buffer("view", size_of::<View>() as u64)?,
             targets: ImageTargets::new(gpu, &plan)?,
             terrain,
-            ground: Ground::new(gpu, &plan)?,
+            terrain_indices: ground::mesh_indices(gpu)?,
+            ground: match plan.rasterizer {
+                Rasterizer::Graphics => GroundPass::Drawn(Ground::new(gpu, &plan)?),
+                Rasterizer::Tiles => GroundPass::Seen(SeenGround::new(gpu, &scene, &plan)?),
+            },
             shader_map: forest.as_ref().map(|f| ShaderMap::new(gpu, &plan, f)).transpose()?,
             shadows: Shadows::new(gpu, &scene, &plan)?,
             sky: SkyPass::new(gpu, &scene, &plan)?,
@@ -285,7 +293,7 @@ impl Renderer {
         }
         let trees = self.forest.as_ref().and_then(|f| Some((&f.near.as_ref()?.cull, &f.seeds, &f.species)));
         let ground = (&self.terrain, &draws);
-        self.shadows.record(&mut recorder, &self.view, &self.ground.indices, ground, trees);
+        self.shadows.record(&mut recorder, &self.view, &self.terrain_indices, ground, trees);
         recorder.stage("image", |r| {
             if let Some(sky) = &self.sky {
                 sky.record(r, &self.view, &self.targets);
@@ -296,14 +304,29 @@ impl Renderer {
             if let Some((forest, map)) = forest {
                 map.record(r, &self.view, ground, forest);
             }
-            self.ground.record(r, &self.view, ground, forest, shadow_map, &self.targets, clear);
-            if let Some((forest, near)) = self.forest.as_ref().and_then(|f| f.near.as_ref().map(|n| (f, n))) {
-                match &near.pass {
-                    TreePass::Graphics(trees) => {
-                        trees.record(r, &self.view, forest, &near.cull, shadow_map, &self.targets);
+            let near = self.forest.as_ref().and_then(|f| Some((f, f.near.as_ref()?)));
+            match &self.ground {
+                GroundPass::Drawn(pass) => {
+                    let (view, indices) = (&self.view, &self.terrain_indices);
+                    pass.record(r, view, indices, ground, forest, shadow_map, &self.targets, clear);
+                    if let Some((forest, NearTrees { cull, pass: TreePass::Graphics(trees) })) = near {
+                        trees.record(r, view, forest, cull, shadow_map, &self.targets);
                     }
-                    TreePass::Tiles(tiles) => {
-                        tiles.record(r, &self.view, forest, &near.cull, shadow_map, &self.targets);
+                }
+                GroundPass::Seen(pass) => {
+                    let (view, indices, targets) = (&self.view, &self.terrain_indices, &self.targets);
+                    pass.see(r, view, indices, ground, targets);
+                    let trees = near.and_then(|(forest, near)| match &near.pass {
+                        TreePass::Tiles(tiles) => Some((tiles, forest, &near.cull)),
+                        TreePass::Graphics(_) => None,
+                    });
+                    if let Some((tiles, forest, cull)) = trees {
+                        tiles.see(r, view, forest, cull, targets);
+                    }
+                    let seen = trees.map(|(tiles, ..)| &tiles.seen);
+                    pass.light(r, view, ground, forest, shadow_map, seen, targets);
+                    if let Some((tiles, forest, cull)) = trees {
+                        tiles.shade(r, view, forest, cull, shadow_map, targets);
                     }
                 }
             }

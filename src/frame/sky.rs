@@ -7,7 +7,7 @@ use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler, Targets,
     shaders, vk,
 };
-use crate::plan::Plan;
+use crate::plan::{Plan, Rasterizer};
 use crate::scene::{Scene, Sky};
 
 /// Draws a latitude-longitude sky.
@@ -45,7 +45,8 @@ impl SkyPass {
             vert: &shaders::FRAME_SKY_VERT,
             frag: if plan.layers { &shaders::FRAME_SKY_LAYERS_FRAG } else { &shaders::FRAME_SKY_FRAG },
             colors: &formats,
-            samples: plan.samples,
+            // Tiles put it behind what samples see pixel by pixel.
+            samples: if plan.rasterizer == Rasterizer::Tiles { 1 } else { plan.samples },
             depth: DepthTest::None,
             constants: &[],
         })?;

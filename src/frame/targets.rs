@@ -5,7 +5,7 @@ use half::f16;
 use crate::camera::NEAR_PLANE;
 use crate::gpu::{Attachment, Buffer, Gpu, Image, ImageDesc, vk};
 use crate::image::{Linear, Picture};
-use crate::plan::Plan;
+use crate::plan::{Plan, Rasterizer};
 use crate::{Result, gpu};
 
 /// Radiance as half floats, relative to the scene's brightest light.
@@ -27,6 +27,7 @@ impl ColorTarget {
         name: &str,
         format: vk::Format,
         usage: vk::ImageUsageFlags,
+        samples: u32,
     ) -> Result<Self> {
         let make = |samples, usage| {
             gpu.image(&ImageDesc { name, format, size: plan.size, layers: 1, levels: 1, samples, usage })
@@ -38,8 +39,8 @@ impl ColorTarget {
                 vk::ImageUsageFlags::STORAGE
             };
         Ok(ColorTarget {
-            multisampled: (plan.samples > 1)
-                .then(|| make(plan.samples, usage | vk::ImageUsageFlags::SAMPLED))
+            multisampled: (samples > 1)
+                .then(|| make(samples, usage | vk::ImageUsageFlags::SAMPLED))
                 .transpose()?,
             image: make(1, resolved)?,
         })
@@ -66,6 +67,8 @@ pub struct ImageTargets {
     pub colors: Vec<ColorTarget>,
     /// Depth.
     pub depth: ColorTarget,
+    /// Quad of terrain that each sample sees, counted from 1, where the ground is lit once it is known to be seen.
+    pub quads: Option<ColorTarget>,
     /// Display picture, a word a pixel.
     pub picture: Buffer,
 }
@@ -79,10 +82,13 @@ impl ImageTargets {
         let color = vk::ImageUsageFlags::COLOR_ATTACHMENT;
         let formats: &[(&str, vk::Format)] = Self::formats(plan.layers);
         let pixels = u64::from(plan.size[0]) * u64::from(plan.size[1]);
+        let tiles = plan.rasterizer == Rasterizer::Tiles;
+        // What tiles find by samples they put together by pixels.
+        let drawn = if tiles { 1 } else { plan.samples };
         Ok(ImageTargets {
             colors: formats
                 .iter()
-                .map(|(name, format)| ColorTarget::new(gpu, plan, name, *format, color))
+                .map(|(name, format)| ColorTarget::new(gpu, plan, name, *format, color, drawn))
                 .collect::<Result<_>>()?,
             depth: ColorTarget::new(
                 gpu,
@@ -90,7 +96,11 @@ impl ImageTargets {
                 "depth",
                 vk::Format::D32_SFLOAT,
                 vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+                plan.samples,
             )?,
+            quads: tiles
+                .then(|| ColorTarget::new(gpu, plan, "quads seen", vk::Format::R32_UINT, color, plan.samples))
+                .transpose()?,
             picture: gpu.buffer("picture", pixels * 4)?,
         })
     }

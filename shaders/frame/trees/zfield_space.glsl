@@ -1,5 +1,42 @@
 // From the world to the scaled space of one tree, where its z-field lives.
 
+// A tree's record, of eight texels.
+Tree fetch_tree(usamplerBuffer trees, uint index) {
+    Tree t;
+    int at = int(index) * 8;
+    uvec4 a = texelFetch(trees, at), b = texelFetch(trees, at + 1), c = texelFetch(trees, at + 2), d = texelFetch(trees, at + 3);
+    t.centre = uintBitsToFloat(a.xyz);
+    t.scale = uintBitsToFloat(a.w);
+    t.turn = uintBitsToFloat(b.xy);
+    t.species = b.z;
+    t.identity = b.w;
+    t.view_layers = c.x;
+    t.light_layers = c.y;
+    t.view_weights = uintBitsToFloat(c.zw);
+    t.light_weights = uintBitsToFloat(d.xy);
+    t.mip = uintBitsToFloat(d.z);
+    t.fade = uintBitsToFloat(d.w);
+    a = texelFetch(trees, at + 4);
+    b = texelFetch(trees, at + 5);
+    c = texelFetch(trees, at + 6);
+    d = texelFetch(trees, at + 7);
+    t.sun = uintBitsToFloat(a.xyz);
+    t.hole = uintBitsToFloat(a.w);
+    t.sky = uintBitsToFloat(b.xyz);
+    t.cascade = b.w;
+    t.mean_sun = uintBitsToFloat(c.xyz);
+    t.own = uintBitsToFloat(c.w);
+    t.mean_sky = uintBitsToFloat(d.xyz);
+    t.mean_lit = uintBitsToFloat(d.w);
+    return t;
+}
+
+// A view's projection, of four texels.
+ViewBasis fetch_basis(samplerBuffer bases, uint view) {
+    int at = int(view) * 4;
+    return ViewBasis(texelFetch(bases, at), texelFetch(bases, at + 1), texelFetch(bases, at + 2), texelFetch(bases, at + 3));
+}
+
 // Rotation back by the tree's turn.
 mat3 tree_rotation(Tree t) {
     return mat3(t.turn.x, -t.turn.y, 0.0, t.turn.y, t.turn.x, 0.0, 0.0, 0.0, 1.0);

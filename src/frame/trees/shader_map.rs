@@ -4,12 +4,15 @@ use crate::Result;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::frame::Forest;
 use crate::frame::shadows::TerrainPush;
-use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
+use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders, vk};
 use crate::plan::Plan;
+
+/// Format and bytes of the texels as which nodes are read.
+pub const NODE_TEXELS: (vk::Format, u64) = (vk::Format::R32G32B32A32_SFLOAT, 16);
 
 /// Nodes of every terrain quad in view, and what computes them.
 pub struct ShaderMap {
-    /// [`ForestNode`]s, 17 × 17 a quad, in the order of the camera's terrain quads.
+    /// [`crate::gpu::interface::ForestNode`]s, 17 × 17 a quad, in the order of the camera's terrain quads.
     pub nodes: Buffer,
     program: Program,
 }
@@ -22,7 +25,7 @@ impl ShaderMap {
     pub fn new(gpu: &Gpu, plan: &Plan, forest: &Forest) -> Result<Self> {
         let float = |n: u32| (n as f32).to_bits();
         Ok(ShaderMap {
-            nodes: gpu.buffer("shader-map nodes", plan.node_bytes())?,
+            nodes: gpu.texel_buffer("shader-map nodes", plan.node_bytes(), NODE_TEXELS)?,
             program: gpu.compute(
                 &shaders::FRAME_TREES_SHADER_MAP_COMP,
                 &[

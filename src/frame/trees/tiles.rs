@@ -42,6 +42,7 @@ pub struct TreeTiles {
     records: Buffer,
     boxes: Buffer,
     spans: Buffer,
+    ranked: Buffer,
     list_counts: Buffer,
     entries: Buffer,
     /// What the passes find.
@@ -80,11 +81,6 @@ impl TreeTiles {
         } else {
             &shaders::FRAME_TREES_TILES_SEE_SINGLE_COMP
         };
-        let shade: &'static Shader = if plan.samples > 1 {
-            &shaders::FRAME_TREES_TILES_SHADE_COMP
-        } else {
-            &shaders::FRAME_TREES_TILES_SHADE_SINGLE_COMP
-        };
         Ok(TreeTiles {
             parameters: TileParameters {
                 size: plan.size,
@@ -100,6 +96,7 @@ impl TreeTiles {
             order: gpu.buffer("trees front to back", trees * 4)?,
             records: gpu.texel_buffer("tree sights", trees * 16 * u64::from(SIGHT_TEXELS), FOUR_WORDS)?,
             boxes: gpu.texel_buffer("tree boxes", trees * 8, TWO_WORDS)?,
+            ranked: gpu.texel_buffer("trees by rank", trees * 4, WORD)?,
             spans: gpu.buffer("tree spans", 4 + trees * 4)?,
             list_counts: gpu.texel_buffer("list ends", 4 + 4 * list_count * u64::from(BIN_LANES), WORD)?,
             entries: gpu.texel_buffer("list entries", 4 * u64::from(STEPS), WORD)?,
@@ -122,7 +119,7 @@ impl TreeTiles {
             entries_fill: gpu.compute(&shaders::FRAME_TREES_TILES_ENTRIES_FILL_COMP, &[])?,
             see: gpu.compute(see, &[("SAMPLES", plan.samples), ("ESTIMATES", before)])?,
             shade: gpu.compute(
-                shade,
+                &shaders::FRAME_TREES_TILES_SHADE_COMP,
                 &[
                     ("SAMPLES", plan.samples),
                     ("ESTIMATES", before),
@@ -135,28 +132,24 @@ impl TreeTiles {
         })
     }
 
-    /// Records all passes.
-    pub fn record(
+    /// Records the passes that find which tree each sample sees before the ground.
+    pub fn see(
         &self,
         recorder: &mut Recorder,
         view: &Buffer,
         forest: &Forest,
         cull: &CullData,
-        shadow_map: &Image,
         targets: &ImageTargets,
     ) {
-        if forest.seeds.visible == 0 {
-            return;
-        }
         let p = &self.parameters;
         let ground = targets.depth.drawn();
         let all = [
             ("view", Resource::Buffer(view)),
-            ("trees", Resource::Buffer(&cull.trees)),
+            ("trees", Resource::Texels(&cull.trees)),
             ("lists", Resource::Buffer(&cull.lists)),
             ("commands", Resource::Buffer(&cull.commands)),
             ("species", Resource::Buffer(&forest.species.table)),
-            ("bases", Resource::Buffer(&forest.species.bases)),
+            ("bases", Resource::Texels(&forest.species.bases)),
             ("masks", Resource::Buffer(&forest.species.masks)),
             ("keys", Resource::Buffer(&self.keys)),
             ("order", Resource::Buffer(&self.order)),
@@ -164,13 +157,12 @@ impl TreeTiles {
             ("state", Resource::Buffer(&self.state)),
             ("depths", Resource::Buffer(&self.depths)),
             ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
-            ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
-            ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
-            ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
-            ("radiance", Resource::Storage(&targets.colors[0].image)),
         ];
         recorder.compute("tree order", |pass| {
-            let depth = with(&all, &[("counts", Resource::Buffer(&self.depth_counts))]);
+            let depth = with(
+                &all,
+                &[("counts", Resource::Buffer(&self.depth_counts)), ("trees", Resource::Buffer(&cull.trees))],
+            );
             pass.bind(&self.order_count, &depth);
             pass.dispatch([ORDER_LANES / 8, 1, 1]);
             pass.barrier();
@@ -186,6 +178,7 @@ impl TreeTiles {
             &[
                 ("records", Resource::Buffer(&self.records)),
                 ("boxes", Resource::Buffer(&self.boxes)),
+                ("ranked", Resource::Buffer(&self.ranked)),
                 ("counts", Resource::Buffer(&self.list_counts)),
                 ("entries", Resource::Buffer(&self.entries)),
             ],
@@ -230,16 +223,37 @@ impl TreeTiles {
             pass.push(p);
             pass.dispatch([across, down, 1]);
         });
+    }
+
+    /// Records the pass that lights them, on top of what else their pixels' samples see.
+    pub fn shade(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        forest: &Forest,
+        cull: &CullData,
+        shadow_map: &Image,
+        targets: &ImageTargets,
+    ) {
+        let [across, down] = self.tiles;
         recorder.compute("tree light", |pass| {
-            let seen = with(
-                &all,
+            pass.bind(
+                &self.shade,
                 &[
+                    ("view", Resource::Buffer(view)),
+                    ("trees", Resource::Texels(&cull.trees)),
+                    ("ranked", Resource::Texels(&self.ranked)),
+                    ("species", Resource::Buffer(&forest.species.table)),
+                    ("bases", Resource::Texels(&forest.species.bases)),
                     ("seen", Resource::Texels(&self.seen)),
-                    ("ground", Resource::Texture(targets.colors[0].drawn(), Sampler::Nearest)),
+                    ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
+                    ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
+                    ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
+                    ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+                    ("radiance", Resource::Storage(&targets.colors[0].image)),
                 ],
             );
-            pass.bind(&self.shade, &seen);
-            pass.push(p);
+            pass.push(&self.parameters);
             pass.dispatch([across, down, 1]);
         });
     }
@@ -260,10 +274,10 @@ impl TreeTiles {
     }
 }
 
-/// Resources of all passes, and more.
+/// Resources of a pass, and those of all, whose names it may take.
 fn with<'a>(
     all: &[(&'static str, Resource<'a>)],
     more: &[(&'static str, Resource<'a>)],
 ) -> Vec<(&'static str, Resource<'a>)> {
-    [all, more].concat()
+    [more, all].concat()
 }

@@ -1,6 +1,6 @@
 // The tree that each sample of a tile sees. One workgroup a tile of 8 x 8 pixels; one invocation a column of them.
 //
-// First the tile's list becomes bits: for each pixel, which of 32 trees' boxes it lies in. Then every invocation goes through its
+// First the tile's list becomes bits: for each pixel, which of 32 trees' boxes it is in. Then every invocation goes through its
 // pixels, and each pixel through its own trees, front to back, until the farthest thing that one of its samples sees is nearer than
 // the next tree can be. Long lists are gone through in parts; between parts the samples are in the buffer that holds the result.
 #include "physics/hash.glsl"
@@ -10,7 +10,7 @@
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/tiles/order.glsl"
 #include "frame/trees/tiles/sight.glsl"
-#include "frame/trees/tiles/samples.glsl"
+#include "frame/samples.glsl"
 
 const uint PART = 1024u;       // trees of a part of a list
 const uint WORDS = PART / 32u; // of bits a pixel
@@ -30,21 +30,49 @@ layout(push_constant) uniform Push { TileParameters p; };
 layout(constant_id = 0) const uint SAMPLES = 4u;
 layout(constant_id = 1) const uint ESTIMATES = 1u;
 
-shared uint bits[WORDS * 64u];
+// A box is columns times rows: a pixel is in those of its column's trees that are its row's too.
+shared uint pairs[PART / 2u];   // columns | rows << 8 of one tree, and of the next << 16
+shared uint columns[WORDS * 8u]; // of each column, which of 32 trees' boxes it crosses
+shared uint rows[WORDS * 8u];
 shared uint left; // whether a pixel may see trees of the next part
 
-// Bits of a tile's pixels that a tree's box covers: those of the first four rows, and of the last.
-uvec2 covered_pixels(uint tree, uvec2 corner) {
+// Columns and rows of a tile that a tree's box covers: eight bits each.
+uint covered_lines(uint tree, uvec2 corner) {
     uvec2 b = texelFetch(boxes, int(tree)).xy;
     ivec4 box = clamp(ivec4(b.x & 0xffffu, b.x >> 16u, b.y & 0xffffu, b.y >> 16u) - ivec4(corner, corner), ivec4(0), ivec4(8));
-    uint columns = ((1u << box.z) - 1u) & ~((1u << box.x) - 1u);
-    columns = box.z > box.x ? columns * 0x01010101u : 0u;
-    uint low = uint(min(box.y, 4)) * 8u, high = uint(min(box.w, 4)) * 8u;
-    uint top = (high < 32u ? (1u << high) - 1u : ~0u) & ~(low < 32u ? (1u << low) - 1u : ~0u);
-    low = uint(max(box.y, 4)) * 8u - 32u;
-    high = uint(max(box.w, 4)) * 8u - 32u;
-    uint bottom = (high < 32u ? (1u << high) - 1u : ~0u) & ~(low < 32u ? (1u << low) - 1u : ~0u);
-    return columns * uvec2(1u, 1u) & uvec2(top, bottom);
+    uvec4 low = (uvec4(1u) << uvec4(box)) - 1u;
+    return (low.z & ~low.x) | (low.w & ~low.y) << 8u;
+}
+
+uint tree_at(bool whole, uint place, uint end) {
+    place = min(place, end - 1u);
+    return whole ? place : texelFetch(entries, int(place)).x;
+}
+
+// Notes which columns and rows the boxes of a part's trees cover: of four trees in a row, and across eight such words.
+void note_boxes(bool whole, uint begin, uint count, uint end, uvec2 corner, uint column) {
+    uint words = (count + 31u) / 32u;
+    for (uint word = 0u; word < words; word++) {
+        for (uint k = 0u; k < 4u; k += 2u) {
+            uint first = word * 32u + column * 4u + k;
+            uint a = covered_lines(tree_at(whole, begin + first, end), corner);
+            uint b = covered_lines(tree_at(whole, begin + first + 1u, end), corner);
+            pairs[first >> 1u] = (first < count ? a : 0u) | (first + 1u < count ? b << 16u : 0u);
+        }
+    }
+    barrier();
+    left = 0u;
+    for (uint word = 0u; word < words; word++) {
+        uint across = 0u, down = 0u;
+        for (uint k = 0u; k < 16u; k++) {
+            uint two = pairs[word * 16u + k] >> column;
+            across |= ((two & 1u) | (two >> 15u & 2u)) << (2u * k);
+            down |= ((two >> 8u & 1u) | (two >> 23u & 2u)) << (2u * k);
+        }
+        columns[word * 8u + column] = across;
+        rows[word * 8u + column] = down;
+    }
+    barrier();
 }
 
 // Samples of one tree at a pixel, and their depth as the depth buffer holds it.
@@ -92,21 +120,8 @@ void main() {
     bool more = true, parted = end > first + PART;
     for (uint begin = first; more; begin += PART) {
         uint count = min(end - min(begin, end), PART), words = (count + 31u) / 32u;
-        for (uint k = column; k < words * 64u; k += 8u) bits[k] = 0u;
-        barrier();
-        left = 0u;
-        for (uint k = column; k < count; k += 8u) {
-            uint tree = whole ? begin + k : texelFetch(entries, int(begin + k)).x;
-            uvec2 covered = covered_pixels(tree, corner);
-            while ((covered.x | covered.y) != 0u) {
-                uint pixel = covered.x != 0u ? uint(findLSB(covered.x)) : 32u + uint(findLSB(covered.y));
-                covered = covered.x != 0u ? uvec2(covered.x & (covered.x - 1u), covered.y) : uvec2(0u, covered.y & (covered.y - 1u));
-                atomicOr(bits[(k >> 5u) * 64u + pixel], 1u << (k & 31u));
-                turns++;
-            }
-            turns++;
-        }
-        barrier();
+        note_boxes(whole, begin, count, end, corner, column);
+        turns += 3u * words;
         bool open = false;
         for (uint row = 0u; row < TILE_SIDE; row++) {
             uvec2 pixel = corner + uvec2(column, row);
@@ -116,17 +131,24 @@ void main() {
             uint tree_of[8];
             float farthest = 1.0;
             for (uint k = 0u; k < SAMPLES; k++) {
-                depth[k] = begin > first ? depths.items[at + k] : ground_depth(ivec2(pixel), int(k));
-                tree_of[k] = begin > first ? seen.items[at + k] : 0u;
-                farthest = min(farthest, depth[k]);
+                depth[k] = ground_depth(ivec2(pixel), int(k));
+                tree_of[k] = 0u;
             }
+            // A loop of no turns or one, because drivers without branches run both sides of those.
+            for (bool again = begin > first; again; again = false) {
+                for (uint k = 0u; k < SAMPLES; k++) {
+                    depth[k] = depths.items[at + k];
+                    tree_of[k] = seen.items[at + k];
+                }
+            }
+            for (uint k = 0u; k < SAMPLES; k++) farthest = min(farthest, depth[k]);
             bool done = !inside;
             for (uint word = 0u; word < words && !done; word++) {
-                uint trees = bits[word * 64u + row * 8u + column];
+                uint trees = columns[word * 8u + column] & rows[word * 8u + row];
                 while (trees != 0u && !done) {
                     uint k = word * 32u + uint(findLSB(trees));
                     trees &= trees - 1u;
-                    uint tree = whole ? begin + k : texelFetch(entries, int(begin + k)).x;
+                    uint tree = tree_at(whole, begin + k, end);
                     Sight s = unpack_sight(records, tree);
                     float z;
                     uint mask = sees(s, vec2(pixel) + 0.5, z);
@@ -146,7 +168,9 @@ void main() {
             open = open || (inside && !done);
             for (uint k = 0u; k < SAMPLES; k++) {
                 if (inside) seen.items[at + k] = tree_of[k];
-                if (inside && parted) depths.items[at + k] = depth[k];
+            }
+            for (bool again = inside && parted; again; again = false) {
+                for (uint k = 0u; k < SAMPLES; k++) depths.items[at + k] = depth[k];
             }
         }
         if (open) atomicOr(left, 1u);

@@ -10,16 +10,15 @@
 #include "physics/transfer.glsl"
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/zfield_light.glsl"
+#include "frame/camera.glsl"
 #include "frame/trees/tiles/box.glsl"
 
 layout(local_size_x = 8) in;
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
-layout(std430, binding = 1) readonly buffer Trees { Tree items[]; } trees;
-layout(std430, binding = 2) readonly buffer Lists { uint items[]; } lists;
+layout(binding = 1) uniform usamplerBuffer trees;
+layout(binding = 2) uniform usamplerBuffer ranked; // tree | draw << 30
 layout(std140, binding = 3) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
-layout(std430, binding = 4) readonly buffer Bases { ViewBasis items[]; } bases;
-layout(std430, binding = 5) readonly buffer Order { uint items[]; } order;
-layout(std430, binding = 6) readonly buffer Commands { DrawCommand items[]; } commands;
+layout(binding = 4) uniform samplerBuffer bases;
 layout(binding = 7) uniform usamplerBuffer seen;
 layout(binding = 8) uniform sampler2DArray views;
 layout(binding = 9) uniform sampler2DArray shadow_map;
@@ -44,11 +43,9 @@ struct Shaded {
 // A tree's light where a pixel sees it; `offset` is the pixel's from the image's centre.
 Shaded shade(uint rank, vec2 offset) {
     View v = view.v;
-    uint place = order.items[rank];
-    Tree t = trees.items[lists.items[place]];
+    uint who = texelFetch(ranked, int(rank)).x, draw = who >> 30u;
+    Tree t = fetch_tree(trees, who & 0x3fffffffu);
     Species kind = species.items[t.species];
-    uint near = commands.items[0].index_count / 6u, middle = near + commands.items[1].index_count / 6u;
-    uint far = middle + commands.items[2].index_count / 6u;
     TreePlane plane = tree_plane(t, kind);
     Camera camera = camera_of(v, vec2(p.size));
     vec3 direction = camera.forward + offset.x * camera.right + offset.y * camera.down;
@@ -61,12 +58,12 @@ Shaded shade(uint rank, vec2 offset) {
     vec3 light_layers = unpack_layers(t.light_layers, kind.first_layer);
     vec3 at[3], to[3];
     for (int k = 0; k < 3; k++) {
-        ViewBasis b = bases.items[uint(layers[k])];
+        ViewBasis b = fetch_basis(bases, uint(layers[k]));
         at[k] = project(b, point);
         to[k] = project(b, c) - at[k];
     }
-    bool magnified = place < near;
-    uint before = place < middle ? ESTIMATES : 0u;
+    bool magnified = draw == 0u;
+    uint before = draw < 2u ? ESTIMATES : 0u;
     Surface surface = zfield_search(views, at, to, layers, vec3(t.view_weights, 1.0 - t.view_weights.x - t.view_weights.y), t.mip,
                                     magnified ? 0u : before, magnified ? before : 0u, below);
     float s = clamp(surface.s, -1e3, 0.999);
@@ -74,7 +71,7 @@ Shaded shade(uint rank, vec2 offset) {
     vec3 metre = toward / plane.half_extent;
     LightRay ray;
     for (int k = 0; k < 3; k++) {
-        ViewBasis b = bases.items[uint(light_layers[k])];
+        ViewBasis b = fetch_basis(bases, uint(light_layers[k]));
         ray.from[k] = project(b, found);
         ray.metre[k] = project(b, metre);
     }
@@ -97,7 +94,7 @@ Shaded shade(uint rank, vec2 offset) {
     shaded.parts = tree_light(views, shadow_map, transfer_1, transfer_2, light, surface, at, to, layers, below, t.mip, magnified, s,
                               found.z, ray, LightQuality(HAS_SUN, LIGHT_ITERATIONS, TRANSFER_BANDS));
     shaded.species = t.species + 1u;
-    shaded.draw = magnified ? 0u : place < middle ? 1u : place < far ? 2u : 3u;
+    shaded.draw = draw;
     shaded.cascade = t.cascade;
     return shaded;
 }

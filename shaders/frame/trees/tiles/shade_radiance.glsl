@@ -1,7 +1,7 @@
-// Radiance of the trees of a tile's pixels, and of the ground where samples see that.
+// Radiance of the trees of a tile's pixels, on top of what the others of their samples see, which is there.
 #include "frame/trees/tiles/shade.glsl"
 
-layout(binding = 12, rgba16f) uniform writeonly image2DArray radiance;
+layout(binding = 12, rgba16f) uniform image2DArray radiance;
 
 shared vec3 colours[8u * MOST_ITEMS];
 
@@ -29,9 +29,10 @@ void main() {
             item++;
         }
         ivec2 pixel = ivec2(corner + uvec2(column, row));
-        for (uint k = 0u; k < SAMPLES; k++) {
-            if (covered != 0u && (covered >> k & 1u) == 0u) sum += ground_colour(pixel, int(k));
+        if (covered != 0u) {
+            // A pixel whose every sample sees a tree holds nothing yet.
+            vec3 before = covered + 1u == 1u << SAMPLES ? vec3(0.0) : imageLoad(radiance, ivec3(pixel, 0)).rgb;
+            imageStore(radiance, ivec3(pixel, 0), vec4(before + sum * (1.0 / float(SAMPLES)), 1.0));
         }
-        if (covered != 0u) imageStore(radiance, ivec3(pixel, 0), vec4(sum * (1.0 / float(SAMPLES)), 1.0));
     }
 }

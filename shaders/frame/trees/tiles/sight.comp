@@ -6,14 +6,15 @@
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/tiles/order.glsl"
 #include "frame/trees/tiles/sight.glsl"
+#include "frame/camera.glsl"
 #include "frame/trees/tiles/box.glsl"
 
 layout(local_size_x = 64) in;
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
-layout(std430, binding = 1) readonly buffer Trees { Tree items[]; } trees;
+layout(binding = 1) uniform usamplerBuffer trees;
 layout(std430, binding = 2) readonly buffer Lists { uint items[]; } lists;
 layout(std140, binding = 3) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
-layout(std430, binding = 4) readonly buffer Bases { ViewBasis items[]; } bases;
+layout(binding = 4) uniform samplerBuffer bases;
 layout(std430, binding = 5) readonly buffer Masks { uvec4 items[]; } masks;
 layout(std430, binding = 6) readonly buffer Commands { DrawCommand items[]; } commands;
 layout(std430, binding = 7) readonly buffer Keys { uint items[]; } keys;
@@ -22,6 +23,7 @@ layout(std430, binding = 9) readonly buffer State { TileState items[]; } state;
 layout(std430, binding = 10) writeonly buffer Records { uvec4 items[]; } records;
 layout(std430, binding = 11) writeonly buffer Boxes { uvec2 items[]; } boxes;
 layout(std430, binding = 12) writeonly buffer Spans { uint items[]; } spans;
+layout(std430, binding = 13) writeonly buffer Ranked { uint items[]; } ranked; // tree | draw << 30
 layout(push_constant) uniform Push { TileParameters p; };
 layout(constant_id = 0) const int VIEW_RINGS = 9;
 layout(constant_id = 1) const float VIEW_RESOLUTION = 256.0;
@@ -48,12 +50,14 @@ void main() {
     if (rank >= state.items[0].tree_count) return;
     View v = view.v;
     uint place = order.items[rank], index = lists.items[place];
-    Tree t = trees.items[index];
+    Tree t = fetch_tree(trees, index);
     Species kind = species.items[t.species];
     TreePlane plane = tree_plane(t, kind);
     vec3 layers = unpack_layers(t.view_layers, kind.first_layer);
-    plane.extent = quad_extent(plane, t.mip, bases.items[uint(layers.x)].bounds, bases.items[uint(layers.y)].bounds,
-                               bases.items[uint(layers.z)].bounds, t.view_layers >> 31u != 0u, VIEW_RINGS, VIEW_RESOLUTION);
+    ViewBasis around[3];
+    for (int k = 0; k < 3; k++) around[k] = fetch_basis(bases, uint(layers[k]));
+    plane.extent = quad_extent(plane, t.mip, around[0].bounds, around[1].bounds, around[2].bounds,
+                               t.view_layers >> 31u != 0u, VIEW_RINGS, VIEW_RESOLUTION);
     Camera camera = camera_of(v, vec2(p.size));
 
     Sight s;
@@ -93,7 +97,7 @@ void main() {
     s.bin = keys.items[place];
     s.fade = t.fade;
     for (int k = 0; k < 3; k++) {
-        ViewBasis b = bases.items[uint(layers[k])];
+        ViewBasis b = around[k];
         s.right[k] = project(b, plane.right);
         s.up[k] = project(b, plane.up);
         s.toward[k] = project(b, plane.w);
@@ -102,6 +106,7 @@ void main() {
     s.dither = unit(hash(t.identity ^ HASH_DITHER));
     s.row = inner_columns(masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz);
     for (uint k = 0u; k < SIGHT_TEXELS; k++) records.items[rank * SIGHT_TEXELS + k] = sight_words(s, k);
+    ranked.items[rank] = index | s.draw << 30u;
     bool empty = box.z <= box.x || box.w <= box.y;
     boxes.items[rank] = empty ? uvec2(0u) : uvec2(box.x | box.y << 16u, box.z | box.w << 16u);
     uvec4 in_lists = box_lists(box, p.list_shift);

@@ -82,3 +82,11 @@ Sight unpack_sight(usamplerBuffer records, uint tree) {
     s.row = w.zw;
     return s;
 }
+
+// Column k of a row of the mask table that lacks its first column, which is empty, and its last, which is full.
+uint inner_column(uvec2 row, uint k, uint samples) {
+    uint full = (1u << samples) - 1u;
+    if (k == 0u || k == samples) return k == 0u ? 0u : full;
+    uint bit = (k - 1u) * samples;
+    return (bit < 32u ? row.x >> bit : row.y >> (bit - 32u)) & full;
+}

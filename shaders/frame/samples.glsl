@@ -6,11 +6,3 @@ const vec2 OFFSETS_8[8] = vec2[](vec2(0.0625, -0.1875), vec2(-0.0625, 0.1875), v
 
 // From the pixel's centre, pixels.
 vec2 sample_offset(uint k, uint samples) { return samples == 8u ? OFFSETS_8[k & 7u] : samples == 4u ? OFFSETS_4[k & 3u] : vec2(0.0); }
-
-// Column k of a row of the mask table that lacks its first column, which is empty, and its last, which is full.
-uint inner_column(uvec2 row, uint k, uint samples) {
-    uint full = (1u << samples) - 1u;
-    if (k == 0u || k == samples) return k == 0u ? 0u : full;
-    uint bit = (k - 1u) * samples;
-    return (bit < 32u ? row.x >> bit : row.y >> (bit - 32u)) & full;
-}

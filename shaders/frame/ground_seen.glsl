@@ -1,0 +1,130 @@
+// Light on the ground where samples see it, once a pixel, and the sky behind. One workgroup a tile of 8 x 8 pixels: every invocation
+// lists the pixels of its column that see ground; then the list is shaded by all in turn.
+#include "frame/ground.glsl"
+#include "frame/camera.glsl"
+#include "frame/samples.glsl"
+#include "frame/forest_node.glsl"
+
+layout(local_size_x = 8) in;
+layout(binding = 1) uniform usamplerBuffer quads;   // of three texels
+layout(binding = 7) uniform samplerBuffer nodes;    // of four texels
+layout(binding = 8) uniform usamplerBuffer trees_seen; // counted from 1, a sample
+layout(binding = 9, rgba16f) uniform image2DArray radiance; // the sky, if that is an image
+layout(constant_id = 2) const uint SAMPLES = 4u;
+layout(constant_id = 3) const bool TREES = true;    // some are drawn before the ground
+layout(constant_id = 4) const bool SKY_IMAGE = false;
+
+TerrainQuad fetch_quad(uint quad) {
+    int at = int(quad) * 3;
+    uvec4 a = texelFetch(quads, at), b = texelFetch(quads, at + 1), c = texelFetch(quads, at + 2);
+    return TerrainQuad(ivec2(a.xy), int(a.z), a.w, uintBitsToFloat(b.xy), uintBitsToFloat(b.zw), uintBitsToFloat(c.x), c.y,
+                       uintBitsToFloat(c.z), uintBitsToFloat(c.w));
+}
+
+ForestNode fetch_node(uint quad, ivec2 node) {
+    int at = (int(quad * FOREST_NODES * FOREST_NODES) + node.y * int(FOREST_NODES) + node.x) * 4;
+    vec4 a = texelFetch(nodes, at), b = texelFetch(nodes, at + 1), c = texelFetch(nodes, at + 2), d = texelFetch(nodes, at + 3);
+    return ForestNode(a.xyz, a.w, b.xyz, b.w, c.x, c.y, c.z, c.w, d.x, d.y);
+}
+
+// A point of a quad's ground; `ray` goes through it, with 1 along the camera's axis, and `distance` is its own along that.
+GroundPoint point_of(uint index, vec3 position, vec3 ray, float distance, Camera camera, out vec3 n) {
+    TerrainQuad q = fetch_quad(index);
+    float cell = float(q.spacing);
+    // Cells from the quad's corner. The last before the end of the terrain is narrower than the others, of the same slopes.
+    vec2 at = (vec2(view.v.grid_camera - q.corner) + (position.xy + view.v.grid_offset) / p.step) / cell;
+    vec2 whole = clamp(floor(at), vec2(0.0), vec2(float(TERRAIN_CELLS - 1u)));
+    vec2 width = max(min((p.last - vec2(q.corner)) / cell - whole, 1.0), 1e-3);
+    vec2 within = (whole + clamp((at - whole) / width, 0.0, 1.0)) / float(TERRAIN_CELLS);
+    vec2 place = at / float(TERRAIN_CELLS);
+    float morph = smoothstep(q.morph.x, q.morph.y, length(position));
+    GroundPoint g;
+    g.position = position;
+    g.slope_at = (within * float(TERRAIN_SLOPES - 1u) + 0.5) / float(TERRAIN_SLOPES);
+    g.layer = q.layer;
+    n = ground_normal(g.slope_at, g.layer);
+    // Where the neighbouring pixels' rays meet the plane through the point: no more grazing than a hundredth of a pixel's slope.
+    float facing = max(-dot(n, ray), 1e-4), scale = q.cover_scale / (p.step * cell * float(TERRAIN_CELLS));
+    vec3 right = camera.right + ray * (dot(n, camera.right) / facing), down = camera.down + ray * (dot(n, camera.down) / facing);
+    g.cover = CoverPoint(vec3(q.cover_offset + q.cover_scale * place, q.cover_floor * morph), q.cover_disc, q.cover_layer,
+                         cover_footprint(right.xy * (scale * distance), down.xy * (scale * distance)));
+    g.tree_sun = g.tree_sky = g.paths = vec4(0.0);
+    g.vertical = vec2(0.0);
+    if (COVER_CHANNELS > 0u) {
+        vec2 node = clamp(within, 0.0, 1.0) * float(FOREST_NODES - 1u);
+        ivec2 low = ivec2(min(floor(node), float(FOREST_NODES - 2u)));
+        vec2 f = node - vec2(low);
+        ForestNode m = mix_nodes(mix_nodes(fetch_node(index, low), fetch_node(index, low + ivec2(1, 0)), f.x),
+                                 mix_nodes(fetch_node(index, low + ivec2(0, 1)), fetch_node(index, low + 1), f.x), f.y);
+        g.tree_sun = vec4(m.tree_sun, m.tree_lit);
+        g.tree_sky = vec4(m.tree_sky, m.converged);
+        g.paths = vec4(m.over, m.seen, m.joint, m.seen_coverage);
+        g.vertical = vec2(m.sky, m.gap);
+    }
+    return g;
+}
+
+shared uint items[64];     // pixels of each column that see ground: its row | samples << 8
+shared uint counts[8];
+
+// Lists the pixels of this invocation's column that see ground. Where others see the sky, that is all that they do.
+void list_pixels(uvec2 corner, uint column, uvec2 size) {
+    uint count = 0u;
+    for (uint row = 0u; row < TILE_SIDE; row++) {
+        uvec2 pixel = min(corner + uvec2(column, row), size - 1u);
+        bool inside = pixel == corner + uvec2(column, row);
+        int at = int((pixel.y * size.x + pixel.x) * SAMPLES);
+        uint open = (1u << SAMPLES) - 1u, samples = 0u;
+        for (uint k = 0u; k < SAMPLES; k++) {
+            if (TREES) open &= texelFetch(trees_seen, at + int(k)).x != 0u ? ~(1u << k) : ~0u;
+            samples |= ground_quad(ivec2(pixel), int(k)) != 0u ? 1u << k : 0u;
+        }
+        samples &= open;
+        if (inside && samples != 0u) {
+            items[column * 8u + count] = row | samples << 8u | open << 16u;
+            count++;
+        }
+        // A sky that is an image is there already, as if all samples saw it.
+        if (inside && samples == 0u && open != 0u && (!SKY_IMAGE || open + 1u != 1u << SAMPLES)) {
+            vec3 sky = SKY_IMAGE ? imageLoad(radiance, ivec3(pixel, 0)).rgb : view.v.sky_radiance;
+            imageStore(radiance, ivec3(pixel, 0), vec4(sky * (float(bitCount(open)) / float(SAMPLES)), 0.0));
+        }
+    }
+    counts[column] = count;
+}
+
+// Light of the ground that a pixel's samples see; `seen` are they.
+GroundLight light_of(ivec2 pixel, uint seen, vec2 size) {
+    Camera camera = camera_of(view.v, size);
+    // The mean of what samples see of the first one's quad.
+    uint quad = 0u;
+    vec3 sum = vec3(0.0);
+    float count = 0.0;
+    for (uint k = 0u; k < SAMPLES; k++) {
+        uint other = ground_quad(pixel, int(k));
+        bool counts = (seen >> k & 1u) != 0u && (quad == 0u || other == quad);
+        vec2 offset = vec2(pixel) + 0.5 + sample_offset(k, SAMPLES) - 0.5 * size;
+        float depth = view.v.clip_from_world[3].z / ground_depth(pixel, int(k));
+        quad = counts ? other : quad;
+        sum += counts ? depth * (camera.forward + offset.x * camera.right + offset.y * camera.down) : vec3(0.0);
+        count += counts ? 1.0 : 0.0;
+    }
+    vec3 position = sum / count, n;
+    float distance = dot(position, camera.forward);
+    GroundPoint at = point_of(quad - 1u, position, position / distance, distance, camera, n);
+    return ground_light(at, n);
+}
+
+// Item i of the tile, counted column after column: its column | row << 3 | samples << 8 | open samples << 16.
+uint item(uint i) {
+    uint found = 0u, before = 0u;
+    for (uint c = 0u; c < 8u; c++) {
+        uint count = counts[c];
+        if (i >= before && i < before + count) {
+            uint word = items[c * 8u + i - before];
+            found = c | (word & 7u) << 3u | (word & 0xffffff00u);
+        }
+        before += count;
+    }
+    return found;
+}

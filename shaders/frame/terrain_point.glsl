@@ -1,0 +1,18 @@
+// The point of the ground that a fragment of the terrain's mesh shows.
+#include "frame/ground.glsl"
+
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec2 slope_at;
+layout(location = 2) flat in uint layer;
+layout(location = 3) in vec3 cover_at;
+layout(location = 4) flat in float cover_disc;
+layout(location = 5) flat in uint cover_layer;
+layout(location = 6) centroid in vec4 tree_sun;
+layout(location = 7) centroid in vec4 tree_sky;
+layout(location = 8) centroid in vec4 paths;
+layout(location = 9) centroid in vec2 vertical;
+
+GroundPoint ground_point() {
+    CoverPoint cover = CoverPoint(cover_at, cover_disc, cover_layer, cover_footprint(dFdx(cover_at.xy), dFdy(cover_at.xy)));
+    return GroundPoint(position, slope_at, layer, cover, tree_sun, tree_sky, paths, vertical);
+}

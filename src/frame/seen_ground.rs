@@ -1,0 +1,121 @@
+//! The ground, lit where it is seen: its mesh leaves the quad and the depth of every sample, and once the trees before it are
+//! known, each pixel's ground is lit once, in compute.
+
+use super::Forest;
+use super::ground::NoTrees;
+use super::shadows::TerrainPush;
+use super::targets::ImageTargets;
+use super::trees::shader_map::ShaderMap;
+use crate::Result;
+use crate::forest::terrain::{TerrainData, TerrainDraws};
+use crate::gpu::interface::{TERRAIN_CELLS, TILE_SIDE};
+use crate::gpu::{
+    Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets, shaders, vk,
+};
+use crate::plan::Plan;
+use crate::scene::{Scene, Sky};
+
+/// Finds and lights the ground.
+pub struct SeenGround {
+    mesh: Program,
+    light: Program,
+    tiles: [u32; 2],
+    none: NoTrees,
+}
+
+impl SeenGround {
+    /// Makes the programs.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the device fails.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
+        let light =
+            if plan.samples > 1 { &shaders::FRAME_GROUND_COMP } else { &shaders::FRAME_GROUND_SINGLE_COMP };
+        Ok(SeenGround {
+            mesh: gpu.graphics(&GraphicsDesc {
+                vert: &shaders::FRAME_TERRAIN_SEEN_VERT,
+                frag: &shaders::FRAME_TERRAIN_SEEN_FRAG,
+                colors: &[vk::Format::R32_UINT],
+                samples: plan.samples,
+                depth: DepthTest::Reverse,
+                constants: &[],
+            })?,
+            light: gpu.compute(
+                light,
+                &[
+                    ("COVER_CHANNELS", plan.cover_channels),
+                    ("COVER_SIDE", plan.coverage_size),
+                    ("SAMPLES", plan.samples),
+                    ("TREES", u32::from(plan.z_fields)),
+                    ("SKY_IMAGE", u32::from(matches!(scene.sky, Sky::LatLong { .. }))),
+                    ("HAS_SUN", u32::from(plan.cascades > 0)),
+                    ("SHADOWED", u32::from(plan.cascades > 0)),
+                ],
+            )?,
+            tiles: plan.size.map(|n| n.div_ceil(TILE_SIDE)),
+            none: NoTrees::new(gpu, plan)?,
+        })
+    }
+
+    /// Records the pass that finds which quad each sample sees, and its depth.
+    pub fn see(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        indices: &Buffer,
+        (terrain, draws): (&TerrainData, &TerrainDraws),
+        targets: &ImageTargets,
+    ) {
+        let colors: Vec<_> = targets.quads.iter().map(|q| q.attachment(Some([0.0; 4]), false)).collect();
+        let depth = Some(targets.depth.attachment(Some([0.0; 4]), false));
+        recorder.render("terrain", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
+            pass.bind(
+                &self.mesh,
+                &[
+                    ("view", Resource::Buffer(view)),
+                    ("quads", Resource::Buffer(&terrain.quads)),
+                    ("height_tiles", Resource::Texture(&terrain.height_tiles, Sampler::Nearest)),
+                ],
+            );
+            pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
+            pass.draw_indexed(indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, 0..draws.camera.1);
+        });
+    }
+
+    /// Records the pass that lights what samples see of it where they see no tree of `trees_seen`, and puts it before the sky.
+    #[allow(clippy::too_many_arguments)]
+    pub fn light(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        (terrain, draws): (&TerrainData, &TerrainDraws),
+        forest: Option<(&Forest, &ShaderMap)>,
+        shadow_map: &Image,
+        trees_seen: Option<&Buffer>,
+        targets: &ImageTargets,
+    ) {
+        let Some(quads_seen) = &targets.quads else { return };
+        let (tiles, nodes) = self.none.or(forest);
+        recorder.compute("ground", |pass| {
+            pass.bind(
+                &self.light,
+                &[
+                    ("view", Resource::Buffer(view)),
+                    ("quads", Resource::Texels(&terrain.quads)),
+                    ("slope_tiles", Resource::Texture(&terrain.slope_tiles, Sampler::Linear)),
+                    ("albedo", Resource::Texture(&terrain.albedo, Sampler::Linear)),
+                    ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+                    ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
+                    ("nodes", Resource::Texels(nodes)),
+                    // Without trees nothing of it is read.
+                    ("trees_seen", Resource::Texels(trees_seen.unwrap_or(&terrain.quads))),
+                    ("radiance", Resource::Storage(&targets.colors[0].image)),
+                    ("depth", Resource::Texture(targets.depth.drawn(), Sampler::Nearest)),
+                    ("quads_seen", Resource::Texture(quads_seen.drawn(), Sampler::Nearest)),
+                ],
+            );
+            pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
+            pass.dispatch([self.tiles[0], self.tiles[1], 1]);
+        });
+    }
+}
