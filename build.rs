@@ -1,11 +1,12 @@
 //! Compiles every shader in `shaders/` with glslang (through shaderc), reflects it with SPIRV-Reflect, and writes
-//! the Rust side: `shaders.rs` (SPIR-V and descriptor bindings) and `interface.rs` (the structs and constants of
+//! the Rust side: `shaders.rs` (SPIR-V, descriptor bindings and specialization constants) and `interface.rs` (the structs and constants of
 //! `shaders/interface.glsl`, with compile-time checks of every offset and size).
 //!
 //! Two builds of each shader: an optimised one for Vulkan 1.3 that runs, and an unoptimised one for Vulkan 1.0
 //! that is reflected, because SPIRV-Reflect 0.2.3 does not understand the newer one. Results are kept by content
 //! under OUT_DIR, so a changed shader recompiles only itself and those that include the changed file.
 
+use std::collections::HashMap;
 use std::collections::hash_map::DefaultHasher;
 use std::fmt::Write as _;
 use std::hash::{Hash, Hasher};
@@ -28,10 +29,20 @@ fn main() -> Fallible<()> {
 
     let compiler = shaderc::Compiler::new()?;
     let mut rust = String::new();
+    let mut types = HashMap::new();
     for path in &sources {
         let name = path.strip_prefix(&root)?.to_string_lossy().replace('\\', "/");
         let text = expand(path, &root, &mut Vec::new())?;
-        let entry = cached(&out, &name, &text, |key| shader(&compiler, &name, path, &root, &out, key))?;
+        let constants = constants(&text).map_err(|e| format!("{name}: {e}"))?;
+        for c in &constants {
+            let known = types.entry(c.name.clone()).or_insert_with(|| (c.kind.clone(), name.clone()));
+            if known.0 != c.kind {
+                let (kind, first) = known;
+                return Err(format!("{name}: {} is {}, and {kind} in {first}", c.name, c.kind).into());
+            }
+        }
+        let entry =
+            cached(&out, &name, &text, |key| shader(&compiler, &name, path, &constants, &root, &out, key))?;
         rust.push_str(&entry);
     }
     fs::write(out.join("shaders.rs"), rust)?;
@@ -72,6 +83,31 @@ fn expand(path: &Path, root: &Path, seen: &mut Vec<PathBuf>) -> Fallible<String>
         all.push('\n');
     }
     Ok(all)
+}
+
+/// A specialization constant: callers set it by its name, which means the same in every shader.
+struct Constant {
+    name: String,
+    kind: String,
+    id: u32,
+}
+
+/// The specialization constants of a shader with everything that it includes.
+fn constants(text: &str) -> Fallible<Vec<Constant>> {
+    let mut found: Vec<Constant> = Vec::new();
+    for line in text.lines().filter(|l| l.contains("constant_id")) {
+        let parsed = line.trim().strip_prefix("layout(constant_id = ").and_then(|rest| {
+            let (id, declaration) = rest.split_once(") const ")?;
+            let (left, _) = declaration.split_once('=')?;
+            let (kind, name) = left.trim().split_once(' ')?;
+            Some(Constant { name: name.trim().into(), kind: kind.into(), id: id.parse().ok()? })
+        });
+        let constant = parsed.ok_or_else(|| {
+            format!("\"{}\" is not like layout(constant_id = N) const TYPE NAME = VALUE;", line.trim())
+        })?;
+        found.push(constant);
+    }
+    Ok(found)
 }
 
 /// `make(key)`, or what it returned for the same text before; the key names the text, and whatever `make` writes beside
@@ -119,6 +155,7 @@ fn shader(
     compiler: &shaderc::Compiler,
     name: &str,
     path: &Path,
+    constants: &[Constant],
     root: &Path,
     out: &Path,
     key: &str,
@@ -172,6 +209,10 @@ fn shader(
             rust,
             "        Binding {{ binding: {binding}, name: {name:?}, kind: vk::DescriptorType::{kind} }},"
         )?;
+    }
+    writeln!(rust, "    ],\n    constants: &[")?;
+    for c in constants {
+        writeln!(rust, "        ({:?}, {}),", c.name, c.id)?;
     }
     writeln!(rust, "    ],\n}};")?;
     Ok(rust)

@@ -20,6 +20,9 @@ const uint BIN_LANES = 64u;           // invocations that write the tiles' lists
 const uint TILE_SIDE = 8u;            // pixels along a side of a tile
 const uint SIGHT_TEXELS = 8u;         // 16-byte words of a tree's record for finding its visible samples
 const uint COVER_SCRATCH = 16u;       // coverage tiles of one scratch word a texel that the scratch buffer holds
+const float FADE_FIRST = 0.9;         // part of its range at which the first of a species' trees has faded out
+const float FADE_SPREAD = 0.1;        // and how much later the last has, each at a time of its own
+const float FADE_RATE = 10.0;         // opacity that a tree loses per part of the range while it fades
 
 // Everything of a frame that does not depend on the object drawn. World positions are relative to the camera. Bound as
 // a uniform block: arrays are of vec4 and mat4 only, so that std140 and std430 agree.
@@ -46,7 +49,7 @@ struct View {
     float hotspot_width;              // a2 of BN12 eq. 8, 1/rad
     float ground_contrast;            // a3 of BN12 eq. 10
     float convergence;                // distance over the range from which light is the average, BN12 eq. 22-25
-    float silhouette_reach;           // range of trees on silhouettes over that of others: 1 without relief
+    float silhouette_ratio;           // range of trees on silhouettes over that of others: 1 without relief
     float silhouette_step;            // first distance from a tree at which its sight line is compared with the ground, m
     float height_cell;                // metres a texel of the height map
     float cells_per_metre;            // 1 / height_cell
@@ -71,8 +74,8 @@ struct Species {
     float height_softness;            // width of the smooth height limits, m
     vec2 map_size;                    // texels of its density map in use
     float slope_softness;             // width of the smooth slope limit, as a tangent
-    float crown_base;                 // height in scaled tree space under which there is only bark
-    vec3 bark;                        // reflectance of bark over albedo of leaves
+    float bare_below;                 // height in scaled tree space under which there is only bark
+    vec3 bark_ratio;                  // reflectance of bark over albedo of leaves
     float mean_area;                  // A: mean horizontal area of its trees, m2
     float vertical_scale;             // of the space in which its tables are, BN12 eq. 2-6
     float max_thickness;              // density times area at the tables' last density
@@ -262,7 +265,7 @@ struct CoverageSplat {
 
 // What producing coverage tiles takes, besides what producing seeds takes.
 struct CoverageParameters {
-    float reach;                      // radius of the largest disc, m
+    float largest_radius;             // of a disc, m
     uint first_tile;                  // of this dispatch
     uint first_splat;                 // of this dispatch
 };

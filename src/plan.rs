@@ -166,7 +166,8 @@ pub struct Plan {
     /// The largest of these, m; 0 without trees.
     pub range: f64,
     /// Range of trees on silhouettes of the ground over that of others (1: no such trees).
-    pub silhouette_reach: f64,
+    #[serde(rename = "silhouette_reach")]
+    pub silhouette_ratio: f64,
     /// Distances under which texels of some tree are magnified, from which every tree covers only a few pixels, and from
     /// which its light has converged to the average, m, ascending: the search for its surface needs filtered estimates, or
     /// none, and then no light ray or shadow either.
@@ -266,7 +267,7 @@ impl Plan {
             shadow_distance: 0.0,
             species_range: Vec::new(),
             range: 0.0,
-            silhouette_reach: 1.0,
+            silhouette_ratio: 1.0,
             draw_limits: [0.0; 3],
             tallest: 0.0,
             quad_side: 1.0,
@@ -330,7 +331,7 @@ impl Plan {
 
     /// Distance to which any tree is drawn, m: those on silhouettes go on beyond the range.
     pub fn last_range(&self) -> f64 {
-        self.range * self.silhouette_reach
+        self.range * self.silhouette_ratio
     }
 
     /// Whether the picture shows trees that are drawn one by one: in a view mode of the ground they would hide it.
@@ -407,18 +408,18 @@ impl Plan {
         // Level ground has no silhouettes. A shader-map at any distance, and trees at any distance, leave them as they are.
         if scene.terrain.heights.is_some() && self.representation == Representation::Auto {
             let ratio = f64::from(s.zfield_min_pixels) / f64::from(s.silhouette_min_pixels);
-            self.silhouette_reach = ratio.max(1.0);
+            self.silhouette_ratio = ratio.max(1.0);
         }
         // Trees are no farther than the terrain, seen from here or from anywhere on it.
         let extent = scene.terrain.extent;
         let farthest = [0, 1].map(|k| eye.position[k].abs().max((eye.position[k] - extent[k]).abs()));
         let farthest = farthest[0].hypot(farthest[1]).hypot(eye.position[2]);
         let farthest = farthest.max(extent[0].hypot(extent[1]));
-        let reach = self.range.min(farthest);
+        let drawn = self.range.min(farthest);
         if let Some(Layout { pattern, tile_side, density }) = Layout::new(scene) {
             (self.tile_side, self.pattern_density) = (tile_side, density);
             self.tiles_per_quad = 4;
-            while reach > QUADS_IN_RANGE * self.tile_side * f64::from(self.tiles_per_quad) {
+            while drawn > QUADS_IN_RANGE * self.tile_side * f64::from(self.tiles_per_quad) {
                 self.tiles_per_quad *= 2;
             }
             self.quad_side = self.tile_side * f64::from(self.tiles_per_quad);
@@ -426,7 +427,7 @@ impl Plan {
             self.pattern = Some(pattern);
         } else {
             // About a thousand listed trees a quad, if they stood evenly.
-            self.quad_side = (1000.0 / area_density).sqrt().max(reach / QUADS_IN_RANGE);
+            self.quad_side = (1000.0 / area_density).sqrt().max(drawn / QUADS_IN_RANGE);
             self.region_capacity = 0;
         }
         self.region_capacity =
@@ -435,14 +436,14 @@ impl Plan {
         let storage = device.map_or(ASSUMED_STORAGE, |d| d.max_storage_bytes.min(1 << 30));
         let across = |k: usize| {
             let exist = (scene.terrain.extent[k] / self.quad_side).ceil().max(1.0);
-            (2.0 * ((reach + self.tallest) / self.quad_side + 1.0).ceil() + 1.0).min(exist)
+            (2.0 * ((drawn + self.tallest) / self.quad_side + 1.0).ceil() + 1.0).min(exist)
         };
         let region_bytes = u64::from(self.region_capacity) * size_of::<gpu::Seed>() as u64;
         let most = (storage / region_bytes).max(1);
         let near = (across(0) * across(1)).min(most as f64);
         // Silhouettes beyond are lines: a few quads wide at any distance, however many quads there are.
-        let lines = if self.silhouette_reach > 1.0 {
-            SILHOUETTE_QUADS * (self.last_range().min(farthest) - reach) / self.quad_side
+        let lines = if self.silhouette_ratio > 1.0 {
+            SILHOUETTE_QUADS * (self.last_range().min(farthest) - drawn) / self.quad_side
         } else {
             0.0
         };

@@ -27,11 +27,11 @@ fn cloud(cards: u32, radius: f32, side: f32) -> Mesh {
         glam::Vec3::new(r * c, r * s, z)
     };
     for _ in 0..cards {
-        let center = direction(&mut random) * (radius * random().cbrt()) + glam::Vec3::Z * radius;
+        let centre = direction(&mut random) * (radius * random().cbrt()) + glam::Vec3::Z * radius;
         let normal = direction(&mut random);
         let a = normal.any_orthonormal_vector() * side;
         let b = normal.cross(a);
-        let p = |s: f32, t: f32| (center + a * s + b * t).to_array();
+        let p = |s: f32, t: f32| (centre + a * s + b * t).to_array();
         let (p0, p1, p2, p3) = (p(-0.5, -0.5), p(0.5, -0.5), p(0.5, 0.5), p(-0.5, 0.5));
         common::push_triangle(&mut mesh, [p0, p1, p2], [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], 0);
         common::push_triangle(&mut mesh, [p0, p2, p3], [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]], 0);
@@ -56,11 +56,11 @@ fn a_dense_cloud_of_uniform_leaves_is_measured_as_one() {
     let k = bake.turned;
     let at = |angle: f32| k.reflected + k.slope * angle;
     assert!([0.0, 1.0].iter().all(|a| (at(*a) - 1.0).abs() < 0.06) && (k.passed - 1.0).abs() < 0.07, "{k:?}");
-    assert_eq!((k.bark, k.share), (0.0, 0.0));
+    assert_eq!((k.bark_reflected, k.bark_share), (0.0, 0.0));
     let area = std::f32::consts::PI * radius * radius;
     assert!((bake.area / area - 1.0).abs() < 0.06, "{} for {area}", bake.area);
-    assert!((bake.crown_radius / radius - 1.0).abs() < 0.03);
-    assert!((bake.height - 2.0 * radius).abs() < 0.2 && bake.crown_base < 1.5);
+    assert!((bake.crown.radius / radius - 1.0).abs() < 0.03);
+    assert!((bake.crown.height - 2.0 * radius).abs() < 0.2 && bake.crown.base < 1.5);
     // Material colour, twice halved: r + r/2.
     for (albedo, color) in bake.albedo().iter().zip([0.4, 0.5, 0.2]) {
         assert!((albedo - 1.5 * color).abs() < 1e-5, "{:?}", bake.albedo());
@@ -114,9 +114,11 @@ fn light_transfer_makes_a_lambertian_ball() {
     let mesh = ball(2.0);
     let settings = BakeSettings { rings: 4, resolution: 64, occlusion_rays: 4, transfer_bands: 2 };
     let bake = bake_species(&mesh, &OpticsOverride::default(), &settings, true).unwrap();
-    let scale = DVec3::new(f64::from(bake.radius), f64::from(bake.radius), f64::from(bake.half_height));
+    let frame = bake.crown.frame;
+    let scale =
+        DVec3::new(f64::from(frame.half_width), f64::from(frame.half_width), f64::from(frame.half_height));
     let side = bake.transfer.resolution as usize;
-    let [reflectance, transmittance] = bake.crown().map(|c| f64::from(c[1]));
+    let [reflectance, transmittance] = bake.crown_leaves().map(|c| f64::from(c[1]));
     let turning = f64::from(bake.turned.slope_of());
     let (mut squares, mut truth_squares, mut sums) = ([0.0; 3], 0.0, [0.0; 4]);
     for (layer, (i, j)) in views::pairs(settings.rings).enumerate() {
@@ -127,8 +129,8 @@ fn light_transfer_makes_a_lambertian_ball() {
             let at = |k: usize| (2.0 * (k as f64 + 0.5) / side as f64 - 1.0) * 64.0 / 62.0;
             let origin = basis.right * at(texel % side) + basis.up * (at(texel / side) * basis.extent);
             let seen = zfield::intersect(&bake.views, 0, &lookup, &zfield::Ray { origin, to: w }, 1);
-            let height = seen.point.z * f64::from(bake.half_height) + f64::from(bake.center);
-            if seen.alpha < 0.999 || height < f64::from(bake.crown_base) + 0.3 {
+            let height = seen.point.z * f64::from(frame.half_height) + f64::from(frame.centre);
+            if seen.alpha < 0.999 || height < f64::from(bake.crown.base) + 0.3 {
                 continue;
             }
             let normal = (seen.point * scale).normalize();
@@ -143,17 +145,20 @@ fn light_transfer_makes_a_lambertian_ball() {
                 let angle = light::angle_between(eye.into(), l.into());
                 let to = l / scale;
                 let way = zfield::light_ray(&bake.views, 0, seen.point, to, 1).s.max(0.0);
-                let law =
-                    light::self_shadow(angle, way, f64::from(bake.leaf_shadow), f64::from(bake.extinction))
-                        * light::leaf_phase(
-                            angle,
-                            reflectance * light::turned_reflectance(turning, angle),
-                            transmittance,
-                        );
+                let law = light::self_shadow(
+                    angle,
+                    way,
+                    f64::from(bake.crown.leaf_shadow),
+                    f64::from(bake.crown.extinction),
+                ) * light::leaf_phase(
+                    angle,
+                    reflectance * light::turned_reflectance(turning, angle),
+                    transmittance,
+                );
                 let truth = f64::from(bake.reflectance[1]) / PI * normal.dot(l).max(0.0);
                 let drawn = [0, 1, 2].map(|n| match n {
                     0 => law,
-                    n => law * transfer::transfer(&bands[..n], l.into(), transfer::reach(angle)),
+                    n => law * transfer::transfer(&bands[..n], l.into(), transfer::strength(angle)),
                 });
                 truth_squares += truth * truth;
                 sums[3] += truth;
@@ -181,7 +186,7 @@ fn the_law_of_self_shadow_is_that_of_the_mesh() {
         let settings = BakeSettings { rings: 6, resolution: 128, occlusion_rays: 8, transfer_bands: 0 };
         let bake = bake_species(&mesh, &OpticsOverride::default(), &settings, true).unwrap();
         let cells = lit_cells(&mesh, &bake, 11).unwrap();
-        let (c, tau) = (f64::from(bake.leaf_shadow), f64::from(bake.extinction));
+        let (c, tau) = (f64::from(bake.crown.leaf_shadow), f64::from(bake.crown.extinction));
         let rms = |law: &dyn Fn(&LitCell) -> f64| {
             let sum: f64 = cells.iter().map(|x| x.weight * (law(x) - x.lit).powi(2)).sum();
             (sum / cells.iter().map(|x| x.weight).sum::<f64>()).sqrt()
@@ -207,7 +212,7 @@ fn masks_take_their_share_of_the_leaf_area() {
     );
     // Half the leaves stop less of the light.
     let through = |x: &canopy::bake::SpeciesBake| {
-        light::self_shadow(1.0, 1.0, x.leaf_shadow.into(), x.extinction.into())
+        light::self_shadow(1.0, 1.0, x.crown.leaf_shadow.into(), x.crown.extinction.into())
     };
     assert!(through(&b) > 1.03 * through(&a), "{} {}", through(&a), through(&b));
     // sRGB 188 is 0.5 linear.
@@ -221,7 +226,12 @@ fn masks_take_their_share_of_the_leaf_area() {
     }
     let c = bake_species(&doubled, &optics, &SMALL, true).unwrap();
     // The same surfaces: only a ray that ends within rounding of one may fall on the other side of it.
-    assert!((c.extinction / a.extinction - 1.0).abs() < 0.01, "{} {}", c.extinction, a.extinction);
+    assert!(
+        (c.crown.extinction / a.crown.extinction - 1.0).abs() < 0.01,
+        "{} {}",
+        c.crown.extinction,
+        a.crown.extinction
+    );
     assert_eq!(c.albedo(), a.albedo());
 }
 
@@ -235,7 +245,7 @@ fn stated_optics_win_and_trees_without_leaves_use_bark() {
         extinction: Some(0.7),
     };
     let bake = bake_species(&mesh, &stated, &SMALL, true).unwrap();
-    assert_eq!(bake.extinction, 0.7);
+    assert_eq!(bake.crown.extinction, 0.7);
     assert_eq!(bake.albedo(), [0.1f32 + 0.05, 0.2, 0.3 + 0.1]);
     mesh.materials[0].foliage = false;
     assert_eq!(bake_species(&mesh, &stated, &SMALL, true).unwrap().albedo(), [0.15; 3]);

@@ -7,29 +7,28 @@ use std::fs;
 use std::sync::OnceLock;
 
 use canopy::bake::tables::{
-    Cast, Crown, FieldCrown, ForestSettings, LeafOptics, Seen, Shape, key, load_or_measure, measure, path,
+    Cast, CrownModel, FieldCrown, ForestSettings, LeafOptics, Seen, key, load_or_measure, measure, path,
 };
 use canopy::bake::{BakeSettings, CacheState, SpeciesBake, bake_species};
+use canopy::physics::crown::{Crown, Frame};
 use canopy::physics::tables::ForestTables;
 use canopy::physics::{light, tables, views, zfield};
 use glam::DVec3;
 
 /// An opaque sphere: BN12's crown, of which everything is known.
-struct Sphere(Shape);
+struct Sphere(Crown, LeafOptics);
 
 impl Sphere {
-    fn new(radius: f32, center: f32) -> Self {
-        Sphere(Shape {
-            center,
+    fn new(radius: f32, centre: f32) -> Self {
+        let crown = Crown {
+            frame: Frame { centre, half_width: radius, half_height: radius },
             radius,
-            half_height: radius,
-            crown_radius: radius,
-            crown_base: center - radius,
-            height: center + radius,
+            base: centre - radius,
+            height: centre + radius,
             leaf_shadow: 0.0,
-            leaf: LeafOptics { scattered: [0.12, 0.06], turning: 0.0, albedo: 0.18 },
             extinction: 1.0,
-        })
+        };
+        Sphere(crown, LeafOptics { scattered: [0.12, 0.06], turning: 0.0, albedo: 0.18 })
     }
 
     fn depth(a: f32, b: f32) -> Option<f32> {
@@ -38,11 +37,15 @@ impl Sphere {
     }
 }
 
-impl Crown for Sphere {
+impl CrownModel for Sphere {
     type Aim = ();
 
-    fn shape(&self) -> &Shape {
+    fn crown(&self) -> &Crown {
         &self.0
+    }
+
+    fn leaf(&self) -> &LeafOptics {
+        &self.1
     }
 
     fn aim(&self, _: f64, _: f64) {}
@@ -343,13 +346,13 @@ fn everything_that_tables_depend_on_is_in_the_key() {
         keys.push(key(bake, &forest));
     }
     let changes: [fn(&mut SpeciesBake); 7] = [
-        |b| b.extinction *= 1.1,
+        |b| b.crown.extinction *= 1.1,
         |b| b.reflectance[1] *= 1.1,
         |b| b.turned.slope += 0.1,
-        |b| b.crown_base += 0.1,
-        |b| b.crown_radius += 0.1,
+        |b| b.crown.base += 0.1,
+        |b| b.crown.radius += 0.1,
         |b| b.views.levels[0][5000] ^= 1,
-        |b| b.radius += 0.1,
+        |b| b.crown.frame.half_width += 0.1,
     ];
     for change in changes {
         let mut other = bake.clone();

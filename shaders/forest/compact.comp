@@ -24,8 +24,8 @@ layout(std430, binding = 7) writeonly buffer Trees { Tree items[]; } trees;
 layout(std430, binding = 8) writeonly buffer Lists { uint items[]; } lists;
 layout(std430, binding = 9) readonly buffer Totals { uint items[]; } totals;
 layout(push_constant) uniform Push { CullParameters p; };
-layout(constant_id = 0) const int RINGS = 9;
-layout(constant_id = 1) const float RESOLUTION = 256.0;
+layout(constant_id = 0) const int VIEW_RINGS = 9;
+layout(constant_id = 1) const float VIEW_RESOLUTION = 256.0;
 layout(constant_id = 2) const float TABLE_ANGLES = 16.0;
 layout(constant_id = 3) const float TABLE_DENSITIES = 8.0;
 layout(constant_id = 4) const bool PAIR_TABLES = true; // the sun's average light is known, and has a share
@@ -44,7 +44,7 @@ uint lookup(vec3 w, out vec2 weights) {
     uvec3 layers;
     vec3 all;
     bool below = w.z < 0.0;
-    view_lookup(below ? -w : w, RINGS, layers, all);
+    view_lookup(below ? -w : w, VIEW_RINGS, layers, all);
     weights = all.xy;
     return layers.x | layers.y << 10u | layers.z << 20u | (below ? 1u << 31u : 0u);
 }
@@ -56,17 +56,17 @@ void average_light(inout Tree t, Species kind, vec3 to_camera, vec3 ground, floa
                                  TABLE_DENSITIES, PAIR_TABLES);
     float lit = nu * sun_facing(view.v.sun_direction, ground);
     t.own = 1.0 - nu;
-    t.mean_sun = (lit * f.transfer) * t.sun * (f.sun.x + f.sun.y * kind.bark);
+    t.mean_sun = (lit * f.transfer) * t.sun * (f.sun.x + f.sun.y * kind.bark_ratio);
     t.mean_lit = lit * (f.sun.x + f.sun.y);
-    t.mean_sky = nu * t.sky * (f.sky.x + f.sky.y * kind.bark);
+    t.mean_sky = nu * t.sky * (f.sky.x + f.sky.y * kind.bark_ratio);
 }
 
 // Opacity factor of a tree: faded out at its range, or on a silhouette, at the farther one.
-float range_fade(SeedQuad q, Seed s, vec3 centre, Species kind, float reach) {
-    float u = unit(hash(s.identity ^ HASH_FADE)), near = tree_fade(reach, u), height = tree_height(kind, s.scale);
-    bool asked = near < 1.0 && view.v.silhouette_reach > 1.0;
+float range_fade(SeedQuad q, Seed s, vec3 centre, Species kind, float relative) {
+    float u = unit(hash(s.identity ^ HASH_FADE)), near = tree_fade(relative, u), height = tree_height(kind, s.scale);
+    bool asked = near < 1.0 && view.v.silhouette_ratio > 1.0;
     float clearance = silhouette(view.v, q, s, centre, height, heights, asked);
-    return max(near, silhouette_opacity(clearance, height) * tree_fade(reach / view.v.silhouette_reach, u));
+    return max(near, silhouette_opacity(clearance, height) * tree_fade(relative / view.v.silhouette_ratio, u));
 }
 
 Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
@@ -90,13 +90,13 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     // One integer mip a tree: texels of 0.35 to 0.7 pixels on the wider side of the box, because bilinear filters are two
     // texels wide. A level coarser blurs neighbouring crowns into each other's gaps, and more ground shows than should.
     float extent = 2.0 * max(kind.scale_to_metres.x, kind.scale_to_metres.z) * s.scale;
-    float texels_per_pixel = RESOLUTION * distance / (extent * v.pixels_at_1m);
-    t.mip = clamp(floor(log2(max(texels_per_pixel, 1e-6)) - 0.5), 0.0, log2(RESOLUTION));
+    float texels_per_pixel = VIEW_RESOLUTION * distance / (extent * v.pixels_at_1m);
+    t.mip = clamp(floor(log2(max(texels_per_pixel, 1e-6)) - 0.5), 0.0, log2(VIEW_RESOLUTION));
     // Trees end smoothly at their range (BN12, section 7), and where the camera enters the crown.
-    float reach = distance / kind.range;
+    float relative = distance / kind.range;
     vec3 eye = (back * -centre) / (kind.scale_to_metres * s.scale);
     float inside = max(length(eye.xy), abs(eye.z));
-    t.fade = range_fade(q, s, centre, kind, reach) * smoothstep(1.05, 1.35, inside);
+    t.fade = range_fade(q, s, centre, kind, relative) * smoothstep(1.05, 1.35, inside);
     vec3 ground = normalize(vec3(-unpackHalf2x16(s.slope), 1.0));
     float density = unpackHalf2x16(s.species_density).y;
     density *= density;
@@ -107,7 +107,7 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     // rho / 2 of a leaf that the upper hemisphere lights, times the visibility of the sky above a slope (BN12, eq. 9).
     t.sky = tint * kind.albedo * (0.25 * (1.0 + ground.z)) * v.sky_radiance;
     t.hole = density * kind.hole;
-    average_light(t, kind, to_camera, ground, density, converged(reach, v.convergence));
+    average_light(t, kind, to_camera, ground, density, converged(relative, v.convergence));
     // From above more of the leaves' upper sides is seen, which the sky lights. The tables' average knows.
     t.sky *= max(kind.sky.x + kind.sky.y * to_camera.z, 0.0);
     t.cascade = cascade_at(v.cascade_far, v.cascade_count, distance);

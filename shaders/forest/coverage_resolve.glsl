@@ -14,7 +14,7 @@ layout(binding = 6, COVER_FORMAT) writeonly uniform image2DArray level_1;
 layout(binding = 7, COVER_FORMAT) writeonly uniform image2DArray level_2;
 layout(binding = 8, COVER_FORMAT) writeonly uniform image2DArray level_3;
 layout(push_constant) uniform Push { SeedParameters p; CoverageParameters c; };
-layout(constant_id = 0) const uint SIDE = 256u;
+layout(constant_id = 0) const uint COVER_SIDE = 256u;
 layout(constant_id = 1) const uint SPECIES_COUNT = 1u;
 
 #include "land/density.glsl"
@@ -56,7 +56,7 @@ void evaluate(CoverageTile tile, uvec2 block, uint thread) {
 
 float coverage_of(CoverageTile tile, uvec2 texel) {
     float sum = 0.0;
-    uint side = SIDE * tile.fine;
+    uint side = COVER_SIDE * tile.fine;
     for (uint j = 0u; j < tile.fine; j++) {
         for (uint i = 0u; i < tile.fine; i++) {
             uint at = tile.first + (texel.y * tile.fine + j) * side + texel.x * tile.fine + i;

@@ -19,7 +19,7 @@ layout(binding = 7) uniform sampler2DArray heights;
 layout(binding = 8) uniform sampler2DArray densities;
 layout(std430, binding = 9) readonly buffer SceneSize { uint species_count; } scene_size;
 layout(push_constant) uniform Push { SeedParameters p; CoverageParameters c; };
-layout(constant_id = 0) const uint SIDE = 256u;
+layout(constant_id = 0) const uint COVER_SIDE = 256u;
 
 #include "land/density.glsl"
 #include "land/candidate.glsl"
@@ -45,12 +45,12 @@ void main() {
     SeedQuad q = quads.items[c.first_splat + gl_WorkGroupID.x];
     CoverageTile tile = tiles.items[splat.tile];
     uint thread = gl_LocalInvocationIndex;
-    int side = int(SIDE * tile.fine);
+    int side = int(COVER_SIDE * tile.fine);
     float texels_per_metre = float(tile.fine) / tile.texel;
     // Only Wang tiles with points from which a disc reaches the tile.
-    float last = float(p.tiles_per_side) - 1.0, across = float(SIDE) * tile.texel;
-    vec2 low = clamp(floor((-splat.corner - c.reach) / p.tile_side), 0.0, last + 1.0);
-    vec2 high = clamp(floor((across - splat.corner + c.reach) / p.tile_side), -1.0, last);
+    float last = float(p.tiles_per_side) - 1.0, across = float(COVER_SIDE) * tile.texel;
+    vec2 low = clamp(floor((-splat.corner - c.largest_radius) / p.tile_side), 0.0, last + 1.0);
+    vec2 high = clamp(floor((across - splat.corner + c.largest_radius) / p.tile_side), -1.0, last);
     uvec2 from = uvec2(low), size = uvec2(max(high - low + 1.0, 0.0));
     uint points = size.x * size.y * p.points_per_tile, total = points + q.position_count;
     uint pattern_count = p.tiles_per_side * p.tiles_per_side * p.points_per_tile;

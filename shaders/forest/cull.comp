@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
 #include "physics/hash.glsl"
+#include "physics/handover.glsl"
 #include "forest/cull.glsl"
 #include "forest/members.glsl"
 

@@ -1,5 +1,5 @@
 // The decision of the cull. `precise` and a fixed order of operations let src/forest/cull.rs agree to the bit.
-// Needs physics/hash.glsl.
+// Needs physics/hash.glsl and physics/handover.glsl.
 
 #include "land/silhouette.glsl"
 
@@ -31,8 +31,8 @@ uint classify(View v, SeedQuad q, Seed s, Species kind, vec3 centre, sampler2DAr
     precise float radius = kind.bounding_radius * s.scale;
     precise float d2 = precise_dot(centre, centre);
     // Where this tree has faded out (tree_fade): among others, and on a silhouette.
-    precise float end = kind.range * (0.9 + 0.1 * unit(hash(s.identity ^ HASH_FADE)));
-    precise float last = end * v.silhouette_reach;
+    precise float end = kind.range * fade_end(unit(hash(s.identity ^ HASH_FADE)));
+    precise float last = end * v.silhouette_ratio;
     if (d2 >= last * last) return 0u;
     bool beyond = d2 >= end * end;
     uint seen = 0u;

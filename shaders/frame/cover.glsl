@@ -3,7 +3,7 @@
 
 layout(binding = 6) uniform sampler2DArray cover_tiles;
 layout(constant_id = 0) const uint COVER_CHANNELS = 0u; // of a tile: 2 or four a layer; 0: no trees
-layout(constant_id = 1) const float COVER_SIDE = 256.0;
+layout(constant_id = 1) const uint COVER_SIDE = 256u;        // texels along a side of a tile
 
 // A place in a coverage tile.
 struct CoverPoint {
@@ -24,7 +24,7 @@ struct Cover {
 Cover cover(CoverPoint place) {
     Cover c;
     for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] = vec4(0.0);
-    float footprint = place.footprint + log2(COVER_SIDE) + view.v.footprint;
+    float footprint = place.footprint + log2(float(COVER_SIDE)) + view.v.footprint;
     float lod = max(footprint, place.at.z);
     for (uint g = 0u; 4u * g < COVER_CHANNELS; g++) {
         c.channels[g] = textureLod(cover_tiles, vec3(place.at.xy, float(place.layer + g)), min(lod, 3.0));

@@ -1,17 +1,25 @@
 // From trees drawn one by one to the shader-map (BN12, section 7). Twin: src/physics/handover.rs, where the forms are
-// derived. `reach` is the distance over that at which a species is no longer drawn tree by tree (s / s_max).
+// derived. `relative` is the distance over that at which a species is no longer drawn tree by tree (s / s_max).
+// Needs interface.glsl.
 
 // How far light and ground have converged to their averages: nu of BN12, eq. 22-25; `end` is 0.8 there.
-float converged(float reach, float end) { return smoothstep(0.0, end, reach); }
+float converged(float relative, float end) { return smoothstep(0.0, end, relative); }
 
 // Share of the trees that the shader-map shows: mean of 1 - tree_fade over u.
-float handed_over(float reach) {
-    float t = clamp((reach - 0.8) * 5.0, 0.0, 1.0);
+float handed_over(float relative) {
+    float t = clamp((relative - 0.8) * 5.0, 0.0, 1.0);
     return t < 0.5 ? 2.0 * t * t : 1.0 - 2.0 * (1.0 - t) * (1.0 - t);
 }
 
-// Opacity factor of one tree, which fades at a time of its own, u in [0, 1).
-float tree_fade(float reach, float u) { return clamp((0.9 + 0.1 * u - reach) * 10.0, 0.0, 1.0); }
+// Relative distance at which one tree has faded out; each does so at a time of its own, u in [0, 1). `precise` lets the
+// CPU's twin of the cull agree to the bit.
+float fade_end(float u) {
+    precise float end = FADE_FIRST + FADE_SPREAD * u;
+    return end;
+}
+
+// Its opacity factor.
+float tree_fade(float relative, float u) { return clamp((fade_end(u) - relative) * FADE_RATE, 0.0, 1.0); }
 
 // What the trees of the shader-map leave of the ground: exp(-handed over optical thickness), and where discs of single
 // trees can be told apart, only between them. Linear in the coverage, whose mean is `expected`: so is its mean right.

@@ -2,7 +2,7 @@
 // src/physics/transfer.rs.
 
 // How much of it there is at a phase angle, given its root.
-float transfer_reach(float root) { return 1.0 - exp(-root); }
+float transfer_strength(float root) { return 1.0 - exp(-root); }
 
 // The coefficients of a sampled colour: bytes are 32 (x + 4).
 vec4 transfer_decode(vec4 sampled) { return sampled * (255.0 / 32.0) - 4.0; }
@@ -11,7 +11,7 @@ vec4 transfer_decode(vec4 sampled) { return sampled * (255.0 / 32.0) - 4.0; }
 vec4 transfer_first(vec3 l) { return vec4(1.0, l); }
 vec4 transfer_second(vec3 l) { return vec4(l.x * l.y, l.y * l.z, l.x * l.z, l.x * l.x - l.y * l.y); }
 
-// M is max(1 + reach x, 0), with x the sum over bands of terms times coefficients. A band's at a point that was found in the
+// M is max(1 + strength x, 0), with x the sum over bands of terms times coefficients. A band's at a point that was found in the
 // views: p + s d, of which each view shows its share (they sum to 1).
 float transfer_fetch(sampler2DArray band, vec4 terms, vec3 p[3], vec3 d[3], vec3 layers, vec3 shares, float mip, float s) {
     vec4 sum = vec4(0.0);

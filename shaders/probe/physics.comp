@@ -79,7 +79,7 @@ void main() {
         case 15u: r.a.x = floatBitsToUint(self_shadow(a.z * sqrt(a.x), a.w * a.x, a.y)); break;
         case 16u: {
             float x = dot(transfer_decode(a), transfer_first(c.xyz)) + dot(transfer_decode(b), transfer_second(c.xyz));
-            r.a.x = floatBitsToUint(max(1.0 + transfer_reach(sqrt(c.w)) * x, 0.0));
+            r.a.x = floatBitsToUint(max(1.0 + transfer_strength(sqrt(c.w)) * x, 0.0));
             break;
         }
     }

@@ -19,15 +19,15 @@ layout(std430, binding = 1) writeonly buffer Results { Values items[]; } results
 layout(binding = 2) uniform sampler3D pair_table;
 layout(binding = 3) uniform sampler2DArray view_table;
 layout(push_constant) uniform Push { uint count; };
-layout(constant_id = 0) const float ANGLES = 16.0;
-layout(constant_id = 1) const float DENSITIES = 8.0;
+layout(constant_id = 0) const float TABLE_ANGLES = 16.0;
+layout(constant_id = 1) const float TABLE_DENSITIES = 8.0;
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
     if (k >= count) return;
     vec4 at = places.items[k].at;
     float species = places.items[k].species.x;
-    results.items[k] = Values(table_pair(pair_table, at.xyz, at.w, species, ANGLES, DENSITIES),
-                              table_view(view_table, at.z, at.w, species, ANGLES, DENSITIES),
-                              vec4(table_ground(view_table, at.w, species, ANGLES, DENSITIES), 0.0, 0.0));
+    results.items[k] = Values(table_pair(pair_table, at.xyz, at.w, species, TABLE_ANGLES, TABLE_DENSITIES),
+                              table_view(view_table, at.z, at.w, species, TABLE_ANGLES, TABLE_DENSITIES),
+                              vec4(table_ground(view_table, at.w, species, TABLE_ANGLES, TABLE_DENSITIES), 0.0, 0.0));
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::file::{Fields, Format, load_or_build};
 use super::{BakeSettings, SpeciesBake, Turned, bake_species, check};
 use crate::Result;
+use crate::physics::crown::{Crown, Frame};
 use crate::physics::transfer::Transfer;
 use crate::physics::views;
 use crate::physics::zfield::ZField;
@@ -110,32 +111,22 @@ pub fn path(dir: &Path, key: &[u8; 32]) -> PathBuf {
 }
 
 fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
-    let ([r0, r1, r2], [t0, t1, t2], [b0, b1, b2]) = (b.reflectance, b.transmittance, b.bark);
-    [
-        b.center,
-        b.radius,
-        b.half_height,
-        b.turned.reflected,
-        b.turned.slope,
-        b.turned.passed,
-        b.turned.bark,
-        b.turned.share,
-        b.leaf_shadow,
-        b.extinction,
-        r0,
-        r1,
-        r2,
-        t0,
-        t1,
-        t2,
-        b0,
-        b1,
-        b2,
-        b.area,
-        b.crown_radius,
-        b.crown_base,
-        b.height,
-    ]
+    let ([r0, r1, r2], [t0, t1, t2], [b0, b1, b2]) = (b.reflectance, b.transmittance, b.bark_reflectance);
+    let Crown {
+        frame: Frame { centre, half_width, half_height },
+        radius,
+        base,
+        height,
+        leaf_shadow,
+        extinction,
+    } = b.crown;
+    let Turned { reflected, slope, passed, bark_reflected, bark_share } = b.turned;
+    #[rustfmt::skip]
+    let all = [
+        centre, half_width, half_height, reflected, slope, passed, bark_reflected, bark_share, leaf_shadow, extinction,
+        r0, r1, r2, t0, t1, t2, b0, b1, b2, b.area, radius, base, height,
+    ];
+    all
 }
 
 /// Bytes of every level of z-field and transfer, from the settings alone.
@@ -157,46 +148,20 @@ fn decode(mut parts: Vec<Vec<u8>>, settings: &BakeSettings) -> SpeciesBake {
     for (x, from) in x.iter_mut().zip(parts[0].as_chunks::<4>().0) {
         *x = f32::from_le_bytes(*from);
     }
+    #[rustfmt::skip]
     let [
-        center,
-        radius,
-        half_height,
-        reflected,
-        slope,
-        passed,
-        bark,
-        share,
-        leaf_shadow,
-        extinction,
-        r0,
-        r1,
-        r2,
-        t0,
-        t1,
-        t2,
-        b0,
-        b1,
-        b2,
-        area,
-        crown_radius,
-        crown_base,
-        height,
+        centre, half_width, half_height, reflected, slope, passed, bark_reflected, bark_share, leaf_shadow, extinction,
+        r0, r1, r2, t0, t1, t2, b0, b1, b2, area, radius, base, height,
     ] = x;
+    let frame = Frame { centre, half_width, half_height };
     SpeciesBake {
         views: ZField { n: settings.rings, resolution: settings.resolution, levels },
         transfer: Transfer { resolution, bands },
-        center,
-        radius,
-        half_height,
-        turned: Turned { reflected, slope, passed, bark, share },
-        leaf_shadow,
-        extinction,
+        crown: Crown { frame, radius, base, height, leaf_shadow, extinction },
+        turned: Turned { reflected, slope, passed, bark_reflected, bark_share },
         reflectance: [r0, r1, r2],
         transmittance: [t0, t1, t2],
-        bark: [b0, b1, b2],
+        bark_reflectance: [b0, b1, b2],
         area,
-        crown_radius,
-        crown_base,
-        height,
     }
 }

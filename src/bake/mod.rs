@@ -20,6 +20,7 @@ pub use self_shadow::{LitCell, lit_cells};
 pub use tables::{ForestSettings, load_or_measure};
 pub use verify::{QualityReport, ViewQuality, demand, verify};
 
+use crate::physics::crown::Crown;
 use crate::physics::transfer::Transfer;
 use crate::physics::zfield::ZField;
 use crate::progress::Progress;
@@ -36,32 +37,18 @@ pub struct SpeciesBake {
     pub views: ZField,
     /// Light transfer of the same views.
     pub transfer: Transfer,
-    /// Centre of the crown box, m above the trunk base along z, on the trunk axis: `o` = (0, 0, `center`).
-    pub center: f32,
-    /// Half extent of the tree in x and y about the trunk axis, m: S = diag(radius, radius, half_height).
-    pub radius: f32,
-    /// Half extent of the tree in z, m.
-    pub half_height: f32,
+    /// Proportions and self-shadow.
+    pub crown: Crown,
     /// How the leaves that are seen and lit are turned, and the bark among them.
     pub turned: Turned,
-    /// c of the crown's self-shadow ([`crate::physics::light::self_shadow`]), 1/√rad.
-    pub leaf_shadow: f32,
-    /// τ of the crown's self-shadow, 1/(m rad).
-    pub extinction: f32,
     /// Leaf reflectance, linear RGB.
     pub reflectance: [f32; 3],
     /// Leaf transmittance, linear RGB; with the reflectance it makes the single-scattering albedo.
     pub transmittance: [f32; 3],
     /// Bark reflectance, linear RGB.
-    pub bark: [f32; 3],
+    pub bark_reflectance: [f32; 3],
     /// Horizontal projected area of the unscaled tree, m² (A of BN12 for scale 1).
     pub area: f32,
-    /// Foliage (crown) half width, m.
-    pub crown_radius: f32,
-    /// Height of the crown's base, m.
-    pub crown_base: f32,
-    /// Height of the tree, m.
-    pub height: f32,
 }
 
 /// How what is seen and lit of a crown differs from leaves of uniform orientation: κ₀, κ₁, κ_t and κ_b of
@@ -75,9 +62,9 @@ pub struct Turned {
     /// κ_t, of the leaves' transmittance.
     pub passed: f32,
     /// κ_b, of the bark's reflectance.
-    pub bark: f32,
+    pub bark_reflected: f32,
     /// Share of bark in what is seen above the crown's base.
-    pub share: f32,
+    pub bark_share: f32,
 }
 
 impl Turned {
@@ -90,17 +77,19 @@ impl Turned {
 impl SpeciesBake {
     /// Reflectance (at phase angle 0; over that it changes with 1 + [`Turned::slope_of`] α) and transmittance of the uniform leaves
     /// that scatter sunlight as the crown does, linear RGB.
-    pub fn crown(&self) -> [[f32; 3]; 2] {
+    pub fn crown_leaves(&self) -> [[f32; 3]; 2] {
         let k = self.turned;
-        let reflectance = std::array::from_fn(|i| k.reflected * self.reflectance[i] + k.bark * self.bark[i]);
+        let reflectance = std::array::from_fn(|i| {
+            k.reflected * self.reflectance[i] + k.bark_reflected * self.bark_reflectance[i]
+        });
         [reflectance, self.transmittance.map(|x| k.passed * x)]
     }
 
     /// Share of the sky's light that the crown's visible surface scatters, leaves and bark, linear RGB.
     pub fn sky_albedo(&self) -> [f32; 3] {
-        let share = self.turned.share;
+        let share = self.turned.bark_share;
         let leaf = self.albedo();
-        std::array::from_fn(|i| (1.0 - share) * leaf[i] + share * self.bark[i])
+        std::array::from_fn(|i| (1.0 - share) * leaf[i] + share * self.bark_reflectance[i])
     }
 
     /// Leaf single-scattering albedo, linear RGB: reflectance + transmittance.

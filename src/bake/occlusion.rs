@@ -292,10 +292,10 @@ mod tests {
         let mut mesh = Mesh { materials: vec![material()], ..Mesh::default() };
         let random = |i: u32| sky_direction(i % 97, 97, i) * if i.is_multiple_of(2) { 1.0 } else { -1.0 };
         for i in 0..400 {
-            let center = random(i) * 4.0 * ((i as f32 + 1.0) / 400.0).cbrt() + Vec3::Z * 5.0;
+            let centre = random(i) * 4.0 * ((i as f32 + 1.0) / 400.0).cbrt() + Vec3::Z * 5.0;
             let a = random(1000 + i).cross(Vec3::X).normalize() * 0.6;
             let b = a.cross(random(2000 + i)).normalize() * 0.6;
-            quad(&mut mesh, center - 0.5 * (a + b), a, b);
+            quad(&mut mesh, centre - 0.5 * (a + b), a, b);
         }
         let (surface, occlusion) = bake(&mesh, 128);
         let caster = Caster::new(&surface);

@@ -13,6 +13,7 @@ use glam::{Vec2, Vec3};
 
 use super::surface::Surface;
 use super::{SpeciesBake, self_shadow};
+use crate::physics::crown::Crown;
 use crate::physics::tonemap::linear as linear_from_srgb;
 use crate::physics::transfer::Transfer;
 use crate::physics::views;
@@ -115,7 +116,7 @@ fn nearest(texture: &Texture, uv: Vec2) -> [u8; 3] {
     [texture.rgba[at], texture.rgba[at + 1], texture.rgba[at + 2]]
 }
 
-/// Horizontal projected area in units of `radius`²: the opacity of the view from the zenith.
+/// Horizontal projected area in units of the frame's `half_width`²: the opacity of the view from the zenith.
 pub fn top_area(field: &ZField) -> f64 {
     let m = f64::from(field.resolution) / f64::from(field.resolution - 2);
     let size = (field.resolution * field.resolution * 4) as usize;
@@ -133,7 +134,7 @@ pub struct Colours {
     /// Leaf transmittance; with the reflectance at most 1.
     pub transmittance: [f32; 3],
     /// Bark reflectance.
-    pub bark: [f32; 3],
+    pub bark_reflectance: [f32; 3],
 }
 
 /// Reflectances measured from a mesh; what the scene states wins.
@@ -156,7 +157,7 @@ fn colours_of(leaves: &Leaves, stated: &OpticsOverride) -> Colours {
         reflectance,
         // A leaf scatters no more than it gets.
         transmittance: std::array::from_fn(|i| transmittance[i].min(1.0 - reflectance[i])),
-        bark: stated.bark_reflectance.unwrap_or(leaves.bark.map(|c| c as f32)),
+        bark_reflectance: stated.bark_reflectance.unwrap_or(leaves.bark.map(|c| c as f32)),
     }
 }
 
@@ -170,24 +171,24 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
     let self_shadow::Measured { shadow, turned } = self_shadow::measure(surface, &matter, &views);
     let [leaf_shadow, extinction] = shadow.map(|x| x as f32);
     let colours = colours_of(&leaves, stated);
-    let area = top_area(&views) * f64::from(frame.radius).powi(2);
+    let area = top_area(&views) * f64::from(frame.half_width).powi(2);
     SpeciesBake {
         views,
         transfer: Transfer::default(),
-        center: frame.center,
-        radius: frame.radius,
-        half_height: frame.half_height,
+        crown: Crown {
+            frame,
+            radius: (area / std::f64::consts::PI).sqrt() as f32,
+            base: leaves.base,
+            height: surface.faces.iter().flat_map(|f| f.p).fold(f32::NEG_INFINITY, |h, p: Vec3| h.max(p.z))
+                * frame.half_height
+                + frame.centre,
+            leaf_shadow,
+            extinction: stated.extinction.unwrap_or(extinction),
+        },
         turned,
-        leaf_shadow,
-        extinction: stated.extinction.unwrap_or(extinction),
         reflectance: colours.reflectance,
-        bark: colours.bark,
+        bark_reflectance: colours.bark_reflectance,
         transmittance: colours.transmittance,
         area: area as f32,
-        crown_radius: (area / std::f64::consts::PI).sqrt() as f32,
-        crown_base: leaves.base,
-        height: surface.faces.iter().flat_map(|f| f.p).fold(f32::NEG_INFINITY, |h, p: Vec3| h.max(p.z))
-            * frame.half_height
-            + frame.center,
     }
 }

@@ -94,8 +94,8 @@ pub struct LitCell {
 pub fn lit_cells(mesh: &Mesh, bake: &SpeciesBake, seed: u32) -> Result<Vec<LitCell>> {
     let surface = Surface::new(mesh)?;
     let foliage: Vec<bool> = mesh.materials.iter().map(|m| m.foliage).collect();
-    let matter = Matter { foliage: &foliage, base: bake.crown_base };
-    Ok(cells(&samples(&surface, &matter, &bake.views, seed), f64::from(bake.half_height)))
+    let matter = Matter { foliage: &foliage, base: bake.crown.base };
+    Ok(cells(&samples(&surface, &matter, &bake.views, seed), f64::from(bake.crown.frame.half_height)))
 }
 
 /// Measures a crown.
@@ -162,8 +162,8 @@ fn turned(samples: &[Sample]) -> Turned {
         reflected: first as f32,
         slope: slope as f32,
         passed: ratio(passed, 1.0) as f32,
-        bark: ratio(bark, 0.0) as f32,
-        share: ratio([seen_bark, seen], 0.0) as f32,
+        bark_reflected: ratio(bark, 0.0) as f32,
+        bark_share: ratio([seen_bark, seen], 0.0) as f32,
     }
 }
 

@@ -2,54 +2,27 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::physics::crown::Frame;
 use crate::rays::{Met, Stack, Triangles};
 use crate::scene::{Material, Mesh};
 use crate::{Error, Result};
 
-/// The affine map between the tree and its scaled space, p' = S⁻¹ (p − o): a cylinder r ≤ 1, |z| ≤ 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
-    /// Height of o, m.
-    pub center: f32,
-    /// Largest horizontal distance from the trunk's axis, m.
-    pub radius: f32,
-    /// Half the range of z, m.
-    pub half_height: f32,
-}
-
-impl Frame {
-    /// The frame of a mesh, a hair wider than the mesh so that rounding leaves no vertex outside.
-    pub fn of(mesh: &Mesh) -> Result<Self> {
-        let points = || mesh.triangles.iter().flat_map(|t| t.vertices).map(|v| mesh.positions[v as usize]);
-        let (mut low, mut high, mut radius) = (f32::INFINITY, f32::NEG_INFINITY, 0f32);
-        for [x, y, z] in points() {
-            low = low.min(z);
-            high = high.max(z);
-            radius = radius.max(x.hypot(y));
-        }
-        let (radius, half_height) = (radius * 1.0001, 0.5 * (high - low) * 1.0001);
-        if !(radius > 0.0 && half_height > 0.0 && radius.is_finite() && half_height.is_finite()) {
-            return Err(Error::Usage(
-                "a tree model needs triangles that extend both sideways and upwards".into(),
-            ));
-        }
-        Ok(Frame { center: 0.5 * (low + high), radius, half_height })
+/// The scaled space of a mesh, a hair wider than the mesh so that rounding leaves no vertex outside.
+fn frame(mesh: &Mesh) -> Result<Frame> {
+    let points = || mesh.triangles.iter().flat_map(|t| t.vertices).map(|v| mesh.positions[v as usize]);
+    let (mut low, mut high, mut radius) = (f32::INFINITY, f32::NEG_INFINITY, 0f32);
+    for [x, y, z] in points() {
+        low = low.min(z);
+        high = high.max(z);
+        radius = radius.max(x.hypot(y));
     }
-
-    /// S, as a vector, m.
-    pub fn scale(&self) -> Vec3 {
-        Vec3::new(self.radius, self.radius, self.half_height)
+    let (half_width, half_height) = (radius * 1.0001, 0.5 * (high - low) * 1.0001);
+    if !(half_width > 0.0 && half_height > 0.0 && half_width.is_finite() && half_height.is_finite()) {
+        return Err(Error::Usage(
+            "a tree model needs triangles that extend both sideways and upwards".into(),
+        ));
     }
-
-    /// Into scaled tree space.
-    pub fn to_scaled(self, p: Vec3) -> Vec3 {
-        (p - Vec3::Z * self.center) / self.scale()
-    }
-
-    /// Into metres about the trunk's base.
-    pub fn to_metres(self, p: Vec3) -> Vec3 {
-        p * self.scale() + Vec3::Z * self.center
-    }
+    Ok(Frame { centre: 0.5 * (low + high), half_width, half_height })
 }
 
 /// Where a material is a hole: opacity below its cutoff.
@@ -122,7 +95,7 @@ pub struct Surface {
 impl Surface {
     /// Prepares a mesh; an error if it has no extent.
     pub fn new(mesh: &Mesh) -> Result<Self> {
-        let frame = Frame::of(mesh)?;
+        let frame = frame(mesh)?;
         let mut masks = Vec::new();
         // A material whose factor alone falls below its cutoff is invisible.
         let invisible = |m: &Material| m.alpha_cutoff.is_some_and(|c| m.base_color[3] < c);

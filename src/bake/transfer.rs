@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::SpeciesBake;
 use super::raster::{NO_FACE, Raster, SUBSAMPLES, View};
 use super::surface::{Caster, Surface};
-use super::tables::{Crown, FieldAim, FieldCrown, Shape};
+use super::tables::{CrownModel, FieldAim, FieldCrown};
 use super::views::rasters;
 use crate::physics::light;
 use crate::physics::transfer::Transfer;
@@ -115,7 +115,7 @@ impl Points {
             .map_init(Stack::new, |stack, face| {
                 progress.step(1);
                 let [a, b, c] = face.p.map(|p| frame.to_metres(p));
-                let area = 0.5 * (b - a).cross(c - a).length() / frame.radius.powi(2);
+                let area = 0.5 * (b - a).cross(c - a).length() / frame.half_width.powi(2);
                 let tries =
                     ((POINTS * resolution as f32).powi(2) * area).ceil().clamp(1.0, MOST as f32) as u32;
                 let on = |k: u32| surface.spread(face, k).map(|(s, t)| a + (b - a) * s + (c - a) * t);
@@ -151,18 +151,18 @@ struct Scatter {
     /// Of the law's crown: reflectance and transmittance.
     crown: [f64; 2],
     /// The law's bark under the crown, over the crown's.
-    bark: f64,
+    bark_ratio: f64,
 }
 
 impl Scatter {
     fn new(mesh: &Mesh, surface: &Surface, bake: &SpeciesBake) -> Self {
         let leafless = !mesh.materials.iter().any(|m| m.foliage);
         let leaf = [luminance(bake.reflectance) as f32, luminance(bake.transmittance) as f32];
-        let bark = [luminance(bake.bark) as f32, 0.0];
+        let bark = [luminance(bake.bark_reflectance) as f32, 0.0];
         let of = |material: u32| {
             if leafless || mesh.materials[material as usize].foliage { leaf } else { bark }
         };
-        let crown = bake.crown().map(luminance);
+        let crown = bake.crown_leaves().map(luminance);
         Scatter {
             faces: surface.faces.iter().map(|f| of(f.material)).collect(),
             normals: surface
@@ -174,7 +174,7 @@ impl Scatter {
                 })
                 .collect(),
             crown,
-            bark: luminance(bake.bark) / (crown[0] + crown[1]).max(1e-3),
+            bark_ratio: luminance(bake.bark_reflectance) / (crown[0] + crown[1]).max(1e-3),
         }
     }
 }
@@ -218,8 +218,7 @@ fn show(
         let turned = light::turned_reflectance(f64::from(bake.turned.slope_of()), angle);
         (angle, light::leaf_phase(angle, scatter.crown[0] * turned, scatter.crown[1]))
     });
-    let [c, tau] = [bake.leaf_shadow, bake.extinction].map(f64::from);
-    let shape = Shape::of(bake);
+    let [c, tau] = [bake.crown.leaf_shadow, bake.crown.extinction].map(f64::from);
     let side = (raster.size / SUBSAMPLES) as usize;
     let block = SUBSAMPLES as usize / STRIDE;
     let texel = |texel: usize| {
@@ -250,7 +249,7 @@ fn show(
         }
         // The renderer knows the texel's mean depth.
         middle /= seen;
-        let colour = 1.0 + f64::from(shape.bark(middle.z)) * (scatter.bark - 1.0);
+        let colour = 1.0 + f64::from(bake.crown.bark_share(middle.z)) * (scatter.bark_ratio - 1.0);
         let law = std::array::from_fn(|k| {
             let (angle, phase) = law[k];
             let way = f64::from(suns[k].way(field, middle));
@@ -276,9 +275,9 @@ fn texels(mut shown: Vec<Option<Shown>>, eye: Vec3, suns: &[Sun], terms: usize) 
         s.truth.iter_mut().zip(ratios).for_each(|(t, r)| *t *= r);
     }
     let angle = |s: &Sun| light::angle_between(eye.as_dvec3().into(), s.to.as_dvec3().into());
-    let reach = std::array::from_fn(|k| transfer::reach(angle(&suns[k])));
+    let strength = std::array::from_fn(|k| transfer::strength(angle(&suns[k])));
     let coefficients = |s: Option<Shown>| match s {
-        Some(s) => (fit(suns, &s, &reach, terms), s.opacity),
+        Some(s) => (fit(suns, &s, &strength, terms), s.opacity),
         None => ([0.0; 8], 0.0),
     };
     shown.into_iter().map(coefficients).collect()
@@ -292,11 +291,11 @@ struct Shown {
 }
 
 /// The least squares of the module's head, for the first `n` coefficients: normal equations, by Cholesky's factors.
-fn fit(suns: &[Sun], shown: &Shown, reach: &[f64; LIGHTS], n: usize) -> [f64; 8] {
+fn fit(suns: &[Sun], shown: &Shown, strength: &[f64; LIGHTS], n: usize) -> [f64; 8] {
     let (mut h, mut x) = ([[0.0; 8]; 8], [0.0; 8]);
     for k in 0..LIGHTS {
         let (t, g) = (f64::from(shown.truth[k]), f64::from(shown.law[k]));
-        let y = suns[k].terms.map(|y| reach[k] * y);
+        let y = suns[k].terms.map(|y| strength[k] * y);
         for i in 0..n {
             x[i] += y[i] * (t - g);
             for j in 0..=i {

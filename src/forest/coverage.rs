@@ -71,7 +71,7 @@ pub struct CoverageData {
     /// Mean area of a disc, m².
     disc: f64,
     /// Radius of the largest disc, m.
-    reach: f64,
+    largest_radius: f64,
     /// Length over which densities may change, m.
     smooth: f64,
 }
@@ -104,7 +104,7 @@ impl CoverageData {
         tree: &Quadtree,
     ) -> Result<Self> {
         let size = plan.coverage_size;
-        let (mut weight, mut area, mut reach, mut smallest) = (0.0, 0.0, 0.0f64, f64::INFINITY);
+        let (mut weight, mut area, mut largest, mut smallest) = (0.0, 0.0, 0.0f64, f64::INFINITY);
         let mut smooth =
             if scene.terrain.heights.is_some() { scene.terrain.cell_size } else { f64::INFINITY };
         let extent = scene.terrain.extent;
@@ -114,14 +114,14 @@ impl CoverageData {
             let density = match &s.distribution {
                 Distribution::Density { max_density, .. } => f64::from(*max_density),
                 Distribution::Positions(list) => {
-                    let largest = list.iter().filter_map(|p| p.scale).fold(0.0, f32::max);
-                    scale = scale.max(f64::from(largest));
+                    let listed = list.iter().filter_map(|p| p.scale).fold(0.0, f32::max);
+                    scale = scale.max(f64::from(listed));
                     list.len() as f64 / (extent[0] * extent[1])
                 }
             };
             weight += density;
             area += density * f64::from(row.mean_area);
-            reach = reach.max(radius * scale);
+            largest = largest.max(radius * scale);
             smallest = smallest.min(radius);
             if let Some(map) = density_map_size(s, extent) {
                 smooth = smooth.min(extent[0] / f64::from(map[0])).min(extent[1] / f64::from(map[1]));
@@ -130,7 +130,8 @@ impl CoverageData {
         let least = LEAST_TEXEL.max(LEAST_RADIUS_PART * smallest);
         let inner = f64::from(size - 2 * COVER_GUTTER);
         let finest = (0..tree.levels()).rev().find(|l| tree.side(*l) / inner >= least).unwrap_or(0);
-        let constants = [(0, size), (1, scene.species.len() as u32), (2, species.map_count)];
+        let of_discs = [("COVER_SIDE", size), ("DENSITY_MAPS", species.map_count)];
+        let of_tiles = [&of_discs[..], &[("SPECIES_COUNT", scene.species.len() as u32)]].concat();
         let texels = u64::from(size) * u64::from(size);
         // Zeros, as the production leaves them.
         let sums =
@@ -151,17 +152,17 @@ impl CoverageData {
             quads: gpu.buffer("coverage quads", 0)?,
             splats: gpu.buffer("coverage splats", 0)?,
             jobs: gpu.buffer("coverage jobs", 0)?,
-            splat: gpu.compute(&shaders::FOREST_COVERAGE_SPLAT_COMP, &constants)?,
+            splat: gpu.compute(&shaders::FOREST_COVERAGE_SPLAT_COMP, &of_discs)?,
             resolve: gpu.compute(
                 match plan.cover_channels {
                     2 => &shaders::FOREST_COVERAGE_RESOLVE_PAIR_COMP,
                     _ => &shaders::FOREST_COVERAGE_RESOLVE_COMP,
                 },
-                &constants,
+                &of_tiles,
             )?,
             finest,
             disc: if weight > 0.0 { area / weight } else { 0.0 },
-            reach,
+            largest_radius: largest,
             smooth,
         })
     }
@@ -293,8 +294,8 @@ impl CoverageData {
         let (side, count) = (seeds.side, seeds.quad_count);
         let across = f64::from(self.tiles.size()[0]) * texel;
         let span = |k: usize| {
-            let first = ((low[k] - self.reach) / side).floor().max(0.0) as i32;
-            let last = ((low[k] + across + self.reach) / side).floor() as i32;
+            let first = ((low[k] - self.largest_radius) / side).floor().max(0.0) as i32;
+            let last = ((low[k] + across + self.largest_radius) / side).floor() as i32;
             first..=last.min(count[k] - 1)
         };
         for y in span(1) {
@@ -322,7 +323,11 @@ impl CoverageData {
         recorder.compute("coverage tiles", |pass| {
             let push = |first_tile, first_splat| Push {
                 seeds: seeds.parameters,
-                coverage: CoverageParameters { reach: self.reach as f32, first_tile, first_splat },
+                coverage: CoverageParameters {
+                    largest_radius: self.largest_radius as f32,
+                    first_tile,
+                    first_splat,
+                },
             };
             for batch in &work.batches {
                 pass.bind(

@@ -9,11 +9,12 @@ use super::species::SpeciesData;
 use super::tables::TableData;
 use super::terrain::TerrainData;
 use crate::gpu::interface::{
-    CAMERA_DRAWS, CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, MAX_CASCADES, Seed, SeedQuad,
-    Species, TREE_LISTS, Tree, View,
+    CAMERA_DRAWS, CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, FADE_FIRST, FADE_RATE, FADE_SPREAD,
+    MAX_CASCADES, Seed, SeedQuad, Species, TREE_LISTS, Tree, View,
 };
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders, vk};
 use crate::land::silhouette::clearance;
+use crate::physics::handover;
 use crate::physics::hash::{HASH_FADE, hash, unit};
 use crate::physics::raster::Raster;
 use crate::plan::Plan;
@@ -21,6 +22,10 @@ use crate::scene::Scene;
 use crate::{Error, Result};
 
 const _: () = assert!(TREE_LISTS == 1 + DISTANCE_BINS + MAX_CASCADES);
+// The band over which trees fade is that of the models.
+const _: () = assert!(FADE_FIRST == handover::FADE_FIRST as f32);
+const _: () = assert!(FADE_SPREAD == handover::FADE_SPREAD as f32);
+const _: () = assert!(FADE_RATE == handover::FADE_RATE as f32);
 
 /// A seed's class: seen by the camera; the low five bits are its distance bin.
 pub const CLASS_CAMERA: u32 = 1 << 5;
@@ -71,11 +76,11 @@ impl CullData {
         let trees = u64::from(plan.tree_capacity);
         let float = |n: u32| (n as f32).to_bits();
         let constants = [
-            (0, scene.settings.view_rings),
-            (1, float(scene.settings.view_resolution)),
-            (2, float(tables.angles)),
-            (3, float(tables.densities)),
-            (4, u32::from(plan.pair_tables)),
+            ("VIEW_RINGS", scene.settings.view_rings),
+            ("VIEW_RESOLUTION", float(scene.settings.view_resolution)),
+            ("TABLE_ANGLES", float(tables.angles)),
+            ("TABLE_DENSITIES", float(tables.densities)),
+            ("PAIR_TABLES", u32::from(plan.pair_tables)),
         ];
         Ok(CullData {
             trees: gpu.texel_buffer(
@@ -194,6 +199,11 @@ pub fn tree_centre(view: &View, quad: &SeedQuad, seed: &Seed, species: &Species)
     [xy[0], xy[1], (seed.ground - view.camera_height) + species.centre * seed.scale]
 }
 
+/// Twin of `fade_end` in `shaders/physics/handover.glsl`, to the bit.
+fn fade_end(u: f32) -> f32 {
+    FADE_FIRST + FADE_SPREAD * u
+}
+
 /// Class of a seed, 0 if no one sees it; twin of `classify` in `shaders/forest/cull.glsl`, to the bit. `heights` is the
 /// terrain's height map.
 pub fn classify(
@@ -207,8 +217,8 @@ pub fn classify(
     let dot = |a: &[f32]| (a[0] * centre[0] + a[1] * centre[1]) + a[2] * centre[2];
     let radius = species.bounding_radius * seed.scale;
     let d2 = dot(&centre);
-    let end = species.range * (0.9 + 0.1 * unit(hash(seed.identity ^ HASH_FADE)));
-    let last = end * view.silhouette_reach;
+    let end = species.range * fade_end(unit(hash(seed.identity ^ HASH_FADE)));
+    let last = end * view.silhouette_ratio;
     if d2 >= last * last {
         return 0;
     }

@@ -82,7 +82,7 @@ impl SeedData {
             species_count: gpu.buffer_with("species count", &[scene.species.len() as u32])?,
             listed_ranges,
             cache: SlotCache::new(plan.seed_regions),
-            program: gpu.compute(&shaders::FOREST_SEEDS_COMP, &[(2, maps)])?,
+            program: gpu.compute(&shaders::FOREST_SEEDS_COMP, &[("DENSITY_MAPS", maps)])?,
             parameters: SeedParameters {
                 extent: scene.terrain.extent.map(|e| e as f32),
                 quad_side: plan.quad_side as f32,
@@ -125,7 +125,7 @@ impl SeedData {
         plan: &Plan,
         tree: &Quadtree,
         eye: &Eye,
-        reach: [f64; 3],
+        sweep: [f64; 3],
     ) -> Result<SeedWork> {
         self.cache.begin_frame();
         self.visible = 0;
@@ -133,8 +133,8 @@ impl SeedData {
         if !plan.z_fields {
             return Ok(SeedWork::default());
         }
-        let mut visible = self.select(tree, eye, plan.range, reach);
-        if let Some(heights) = scene.terrain.heights.as_ref().filter(|_| plan.silhouette_reach > 1.0) {
+        let mut visible = self.select(tree, eye, plan.range, sweep);
+        if let Some(heights) = scene.terrain.heights.as_ref().filter(|_| plan.silhouette_ratio > 1.0) {
             let ground = Ground { heights, terrain: &scene.terrain, lowest: tree.total_range()[0] };
             self.add_silhouettes(&ground, plan, tree, eye, &mut visible);
         }
@@ -160,8 +160,8 @@ impl SeedData {
         Ok(work)
     }
 
-    /// Quads within `range` whose trees, or the trees' shadows (`reach` long, away from the sun), may be in view.
-    fn select(&self, tree: &Quadtree, eye: &Eye, range: f64, reach: [f64; 3]) -> Vec<(i32, i32)> {
+    /// Quads within `range` whose trees, or the trees' shadows (swept as far as `sweep`, away from the sun), may be in view.
+    fn select(&self, tree: &Quadtree, eye: &Eye, range: f64, sweep: [f64; 3]) -> Vec<(i32, i32)> {
         let side = f64::from(self.parameters.quad_side);
         let planes = eye.planes();
         let span = |k: usize| {
@@ -175,8 +175,8 @@ impl SeedData {
                 // Shadows reach away from the sun.
                 let tall = self.tree_bounds(tree, (x, y));
                 let swept = Bounds {
-                    low: [0, 1, 2].map(|k| tall.low[k] + reach[k].min(0.0)),
-                    high: [0, 1, 2].map(|k| tall.high[k] + reach[k].max(0.0)),
+                    low: [0, 1, 2].map(|k| tall.low[k] + sweep[k].min(0.0)),
+                    high: [0, 1, 2].map(|k| tall.high[k] + sweep[k].max(0.0)),
                 };
                 if tall.distance(eye.position) <= range && swept.touches(&planes, eye.position) {
                     found.push((x, y));

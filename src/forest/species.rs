@@ -219,20 +219,21 @@ fn rows(
             maps[k].as_ref().map_or([1.0; 2], |m| [m.relative.width as f32, m.relative.height as f32]);
         let [low, high] = between.unwrap_or([-1e30, 1e30]);
         let tangent = slope.map_or(1e30, |s| s.to_radians().tan());
-        let [reflectance, transmittance] = bake.crown();
+        let crown = &bake.crown;
+        let [reflectance, transmittance] = bake.crown_leaves();
         rows.push(Row {
-            scale_to_metres: [bake.radius, bake.radius, bake.half_height],
-            centre: bake.center,
+            scale_to_metres: crown.frame.scale().into(),
+            centre: crown.frame.centre,
             reflectance,
-            extinction: bake.extinction,
-            leaf_shadow: bake.leaf_shadow,
+            extinction: crown.extinction,
+            leaf_shadow: crown.leaf_shadow,
             albedo: bake.sky_albedo(),
             sky: tables.sky,
             turning: bake.turned.slope_of(),
             transmittance,
             range: plan.species_range[k] as f32,
-            crown_radius: bake.crown_radius,
-            bounding_radius: bake.radius.hypot(bake.half_height),
+            crown_radius: crown.radius,
+            bounding_radius: crown.frame.half_width.hypot(crown.frame.half_height),
             first_layer: k as u32 * view_count,
             scale_range: species.scale,
             max_density,
@@ -242,10 +243,12 @@ fn rows(
             height_softness: if between.is_some() { HEIGHT_SOFTNESS * (high - low) } else { 1.0 },
             map_size,
             slope_softness: if slope.is_some() { SLOPE_SOFTNESS * tangent } else { 1.0 },
-            crown_base: (bake.crown_base - bake.center) / bake.half_height,
+            bare_below: crown.bare_below(),
             // Black leaves have no colour to compare with.
-            bark: std::array::from_fn(|i| bake.bark[i] / (reflectance[i] + transmittance[i]).max(1e-3)),
-            mean_area: std::f32::consts::PI * bake.crown_radius.powi(2) * mean_squared_scale(species) as f32,
+            bark_ratio: std::array::from_fn(|i| {
+                bake.bark_reflectance[i] / (reflectance[i] + transmittance[i]).max(1e-3)
+            }),
+            mean_area: std::f32::consts::PI * crown.radius.powi(2) * mean_squared_scale(species) as f32,
             vertical_scale: tables.vertical_scale,
             hole: tables.hole,
             max_thickness: tables.max_thickness,

@@ -75,6 +75,15 @@ impl Ground {
     pub fn new(gpu: &Gpu, plan: &Plan) -> Result<Self> {
         let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
         let program = |shadowed: bool| {
+            let mut constants = vec![
+                ("COVER_CHANNELS", plan.cover_channels),
+                ("COVER_SIDE", plan.coverage_size),
+                ("HAS_SUN", u32::from(plan.cascades > 0)),
+                ("SHADOWED", u32::from(shadowed)),
+            ];
+            if plan.view_mode != ViewMode::Radiance {
+                constants.push(("VIEW_MODE", plan.view_mode as u32));
+            }
             gpu.graphics(&GraphicsDesc {
                 vert: &shaders::FRAME_TERRAIN_VERT,
                 frag: match plan.view_mode {
@@ -85,13 +94,7 @@ impl Ground {
                 colors: &formats,
                 samples: plan.samples,
                 depth: DepthTest::Reverse,
-                constants: &[
-                    (0, plan.cover_channels),
-                    (1, (plan.coverage_size as f32).to_bits()),
-                    (5, u32::from(plan.cascades > 0)),
-                    (6, u32::from(shadowed)),
-                    (12, plan.view_mode as u32),
-                ],
+                constants: &constants,
             })
         };
         Ok(Ground {

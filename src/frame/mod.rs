@@ -62,9 +62,9 @@ pub struct NearTrees {
 /// What draws them.
 enum TreePass {
     /// The graphics pipeline.
-    Graphics(Trees),
+    Graphics(Box<Trees>),
     /// Compute tiles.
-    Tiles(TreeTiles),
+    Tiles(Box<TreeTiles>),
 }
 
 /// What lights the ground.
@@ -146,10 +146,10 @@ impl Renderer {
                     cull: CullData::new(gpu, &scene, &plan, &tables)?,
                     pass: match plan.rasterizer {
                         Rasterizer::Graphics => {
-                            TreePass::Graphics(Trees::new(gpu, &scene, &plan, species.mask_rows)?)
+                            TreePass::Graphics(Box::new(Trees::new(gpu, &scene, &plan, species.mask_rows)?))
                         }
                         Rasterizer::Tiles => {
-                            TreePass::Tiles(TreeTiles::new(gpu, &scene, &plan, species.mask_rows)?)
+                            TreePass::Tiles(Box::new(TreeTiles::new(gpu, &scene, &plan, species.mask_rows)?))
                         }
                     },
                 })
@@ -264,8 +264,8 @@ impl Renderer {
         let mut draws = self.terrain.update(eye, cascades, pixels)?;
         let mut work = None;
         if let Some(forest) = &mut self.forest {
-            let reach = shadow_reach(sun, plan.cascades, plan.tallest + 0.25 * (highest - lowest));
-            let fresh = forest.seeds.update(gpu, scene, plan, &self.terrain.tree, eye, reach)?;
+            let sweep = shadow_sweep(sun, plan.cascades, plan.tallest + 0.25 * (highest - lowest));
+            let fresh = forest.seeds.update(gpu, scene, plan, &self.terrain.tree, eye, sweep)?;
             work = Some((fresh, forest.coverage.update(gpu, &self.terrain.tree, &forest.seeds, &mut draws)?));
         }
         self.terrain.upload(gpu, &draws)?;
@@ -398,7 +398,7 @@ impl Renderer {
 }
 
 /// How far, and which way, a shadow of something `tall` reaches on level ground; at most twenty times its height.
-fn shadow_reach(sun: [f64; 3], cascades: u32, tall: f64) -> [f64; 3] {
+fn shadow_sweep(sun: [f64; 3], cascades: u32, tall: f64) -> [f64; 3] {
     if cascades == 0 {
         return [0.0; 3];
     }

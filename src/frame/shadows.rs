@@ -61,7 +61,7 @@ impl Shadows {
             })
         };
         let s = &scene.settings;
-        let views = [(0, s.view_rings), (1, (s.view_resolution as f32).to_bits())];
+        let views = [("VIEW_RINGS", s.view_rings), ("VIEW_RESOLUTION", (s.view_resolution as f32).to_bits())];
         if !on {
             return Ok(Shadows { map, programs: None });
         }

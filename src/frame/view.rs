@@ -64,7 +64,7 @@ pub fn view(
     view.hotspot_width = s.hotspot_width;
     view.ground_contrast = s.ground_contrast;
     view.convergence = s.convergence;
-    view.silhouette_reach = plan.silhouette_reach as f32;
+    view.silhouette_ratio = plan.silhouette_ratio as f32;
     view.silhouette_step = plan.tallest as f32;
     view.height_cell = scene.terrain.cell_size as f32;
     view.cells_per_metre = (1.0 / scene.terrain.cell_size) as f32;

@@ -57,6 +57,8 @@ pub struct Shader {
     pub spirv: &'static [u8],
     /// Its bindings, sorted.
     pub bindings: &'static [Binding],
+    /// Its specialization constants: name and id. Callers set them by name; one name means the same in every shader.
+    pub constants: &'static [(&'static str, u32)],
 }
 
 /// Every shader of the program, compiled and reflected by `build.rs`.

@@ -88,19 +88,21 @@ pub struct GraphicsDesc<'a> {
     pub samples: u32,
     /// Depth test; the depth buffer is D32.
     pub depth: DepthTest,
-    /// Specialization constants: (id, value).
-    pub constants: &'a [(u32, u32)],
+    /// Every specialization constant of the two shaders by name, and the 32 bits of its value.
+    pub constants: &'a [(&'a str, u32)],
 }
 
 impl Gpu {
-    /// A compute pipeline with 32-bit specialization constants (id, value).
+    /// A compute pipeline; with every specialization constant of the shader by name, and the 32 bits of its value.
     ///
     /// # Errors
+    /// [`Error::Usage`] for a constant that the shader does not have, or one of its own that is missing;
     /// [`Error::Device`] if the driver refuses it.
-    pub fn compute(&self, shader: &'static Shader, constants: &[(u32, u32)]) -> Result<Program> {
+    pub fn compute(&self, shader: &'static Shader, constants: &[(&str, u32)]) -> Result<Program> {
+        check_constants(&[shader], constants)?;
         let mut program = self.layouts(&[shader], vk::PipelineBindPoint::COMPUTE)?;
         let module = Module::new(&self.shared, shader)?;
-        let (entries, data) = specialization(constants);
+        let (entries, data) = (specialization(shader, constants), values(constants));
         let special = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
         let stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(shader.stage)
@@ -122,18 +124,22 @@ impl Gpu {
     /// A graphics pipeline.
     ///
     /// # Errors
+    /// [`Error::Usage`] for a specialization constant that neither shader has, or one of theirs that is missing;
     /// [`Error::Device`] if the driver refuses it.
     pub fn graphics(&self, d: &GraphicsDesc) -> Result<Program> {
+        check_constants(&[d.vert, d.frag], d.constants)?;
         let mut program = self.layouts(&[d.vert, d.frag], vk::PipelineBindPoint::GRAPHICS)?;
         let (vert, frag) = (Module::new(&self.shared, d.vert)?, Module::new(&self.shared, d.frag)?);
-        let (entries, data) = specialization(d.constants);
-        let special = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
-        let stages = [(d.vert, &vert), (d.frag, &frag)].map(|(s, m)| {
+        let data = values(d.constants);
+        let entries = [d.vert, d.frag].map(|s| specialization(s, d.constants));
+        let [of_vert, of_frag] =
+            entries.each_ref().map(|e| vk::SpecializationInfo::default().map_entries(e).data(&data));
+        let stages = [(d.vert, &vert, &of_vert), (d.frag, &frag, &of_frag)].map(|(s, m, special)| {
             vk::PipelineShaderStageCreateInfo::default()
                 .stage(s.stage)
                 .module(m.handle)
                 .name(c"main")
-                .specialization_info(&special)
+                .specialization_info(special)
         });
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
@@ -302,11 +308,31 @@ impl Drop for Module<'_> {
     }
 }
 
-fn specialization(constants: &[(u32, u32)]) -> (Vec<vk::SpecializationMapEntry>, Vec<u8>) {
-    let entries = constants.iter().enumerate().map(|(k, (id, _))| vk::SpecializationMapEntry {
-        constant_id: *id,
-        offset: 4 * k as u32,
-        size: 4,
-    });
-    (entries.collect(), constants.iter().flat_map(|(_, v)| v.to_ne_bytes()).collect())
+/// Refuses constants that no stage declares, and stages with constants that are not given: neither would be heard of.
+fn check_constants(stages: &[&'static Shader], constants: &[(&str, u32)]) -> Result<()> {
+    let declared = || stages.iter().flat_map(|s| s.constants.iter().map(move |(name, _)| (s.name, *name)));
+    let unknown = constants.iter().find(|(name, _)| declared().all(|(_, known)| known != *name));
+    if let Some((name, _)) = unknown {
+        let stages: Vec<_> = stages.iter().map(|s| s.name).collect();
+        return Err(Error::Usage(format!("{}: no specialization constant \"{name}\"", stages.join(", "))));
+    }
+    match declared().find(|(_, known)| constants.iter().all(|(name, _)| name != known)) {
+        Some((stage, name)) => {
+            Err(Error::Usage(format!("{stage}: specialization constant \"{name}\" is not given")))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Where a stage's constants are among the values.
+fn specialization(stage: &Shader, constants: &[(&str, u32)]) -> Vec<vk::SpecializationMapEntry> {
+    let entry = |(k, (name, _)): (usize, &(&str, u32))| {
+        let (_, id) = stage.constants.iter().find(|(known, _)| known == name)?;
+        Some(vk::SpecializationMapEntry { constant_id: *id, offset: 4 * k as u32, size: 4 })
+    };
+    constants.iter().enumerate().filter_map(entry).collect()
+}
+
+fn values(constants: &[(&str, u32)]) -> Vec<u8> {
+    constants.iter().flat_map(|(_, value)| value.to_ne_bytes()).collect()
 }

@@ -173,8 +173,8 @@ fn section(
     [from, to]: [f64; 2],
     mut found: impl FnMut(f64),
 ) {
-    let reach = tall * f64::from(1u32 << (STEPS - 1));
-    let count = ((to + reach) / spacing).ceil() as usize + 2;
+    let looked = tall * f64::from(1u32 << (STEPS - 1));
+    let count = ((to + looked) / spacing).ceil() as usize + 2;
     let distance = |k: usize| (k as f64 + 0.5) * spacing;
     // Heights above the eye.
     let heights: Vec<f64> = (0..count).map(|k| height(distance(k)) - z).collect();

@@ -1,7 +1,7 @@
 //! From trees drawn one by one to the shader-map (BN12, section 7), so that the mean radiance of a forest does not depend
 //! on the distance; twin of `shaders/physics/handover.glsl`.
 //!
-//! `reach` is s/s_max. BN12 fade all trees alike with 1 − smoothstep(0.8, 1, s/s_max) and mix the shader-map's trees in with
+//! `relative` is the distance s over the range, s/s_max. BN12 fade all trees alike with 1 − smoothstep(0.8, 1, s/s_max) and mix the shader-map's trees in with
 //! (1 − k_g − k_ḡ)·smoothstep (eq. 26, 27). Two things are changed:
 //!
 //! - Each tree fades over a tenth of the range at a time of its own, u in [0, 1) from its hash, so that single trees go and
@@ -20,20 +20,32 @@
 ///
 /// BN12 end at 0.8. Trees of a few pixels know their light only roughly: shadow maps blur it, so that what is brightest
 /// (the hotspot) darkens and what is darkest brightens. An earlier end keeps more of the average and takes fewer shadows.
-pub fn converged(reach: f64, end: f64) -> f64 {
-    let t = (reach / end).clamp(0.0, 1.0);
+pub fn converged(relative: f64, end: f64) -> f64 {
+    let t = (relative / end).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
 /// S: share of the trees that the shader-map shows; 0 up to 0.8, 1 from 1 on.
-pub fn handed_over(reach: f64) -> f64 {
-    let t = ((reach - 0.8) / 0.2).clamp(0.0, 1.0);
+pub fn handed_over(relative: f64) -> f64 {
+    let t = ((relative - 0.8) / 0.2).clamp(0.0, 1.0);
     if t < 0.5 { 2.0 * t * t } else { 1.0 - 2.0 * (1.0 - t) * (1.0 - t) }
 }
 
-/// Opacity factor of one tree that fades at its own time u in [0, 1).
-pub fn tree_fade(reach: f64, u: f64) -> f64 {
-    ((0.9 + 0.1 * u - reach) / 0.1).clamp(0.0, 1.0)
+/// s/s_max at which the first of a species' trees has faded out.
+pub const FADE_FIRST: f64 = 0.9;
+/// How much later in s/s_max the last one has.
+pub const FADE_SPREAD: f64 = 0.1;
+/// Opacity that a tree loses per s/s_max while it fades.
+pub const FADE_RATE: f64 = 10.0;
+
+/// s/s_max at which a tree has faded out that does so at its own time u in [0, 1).
+pub fn fade_end(u: f64) -> f64 {
+    FADE_FIRST + FADE_SPREAD * u
+}
+
+/// Opacity factor of that tree.
+pub fn tree_fade(relative: f64, u: f64) -> f64 {
+    ((fade_end(u) - relative) * FADE_RATE).clamp(0.0, 1.0)
 }
 
 /// Ground that the shader-map's trees leave: `thickness` is Σ S_i L_i, `over` its share of Σ L_i.
@@ -50,9 +62,9 @@ mod tests {
     fn trees_fade_one_by_one_and_all_together_as_the_shader_map_takes_over() {
         let n = 20_000;
         for k in 0..=240 {
-            let reach = f64::from(k) / 200.0;
-            let mean = (0..n).map(|i| tree_fade(reach, (f64::from(i) + 0.5) / f64::from(n))).sum::<f64>();
-            assert!((mean / f64::from(n) - (1.0 - handed_over(reach))).abs() < 1e-6, "{reach}");
+            let relative = f64::from(k) / 200.0;
+            let mean = (0..n).map(|i| tree_fade(relative, (f64::from(i) + 0.5) / f64::from(n))).sum::<f64>();
+            assert!((mean / f64::from(n) - (1.0 - handed_over(relative))).abs() < 1e-6, "{relative}");
         }
         // Alone, a tree fades within a tenth of the range.
         assert_eq!((tree_fade(0.85, 0.5), tree_fade(0.951, 0.5)), (1.0, 0.0));

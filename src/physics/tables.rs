@@ -22,7 +22,7 @@
 //! Against the reference, an oak forest on a slope of 30° away from a sun at 45°: rms 3.6 %, where the turn leaves 9.4 %.
 //!
 //! # Density
-//! x = λA: trees per m², times their mean horizontal area A = π `crown_radius`² E(scale²).
+//! x = λA: trees per m², times their mean horizontal area A = π `crown.radius`² E(scale²).
 //!
 //! # Nodes
 //! n = `angles` and m = `densities` of them:

@@ -30,8 +30,8 @@ pub struct Transfer {
     pub bands: Vec<Vec<Vec<u8>>>,
 }
 
-/// w: how much of transfer there is at a phase angle, rad.
-pub fn reach(angle: f64) -> f64 {
+/// w: the strength of transfer at a phase angle, rad.
+pub fn strength(angle: f64) -> f64 {
     1.0 - (-angle.sqrt()).exp()
 }
 
@@ -50,10 +50,10 @@ pub fn decode(bytes: [u8; 4]) -> [f64; 4] {
     bytes.map(|b| STEP * (f64::from(b) - ZERO))
 }
 
-/// M of a texel, of as many bands as there are, for light from the unit vector `l` with w = `reach`.
-pub fn transfer(bands: &[[f64; TERMS]], l: [f64; 3], reach: f64) -> f64 {
+/// M of a texel, of as many bands as there are, for light from the unit vector `l` with w = `strength`.
+pub fn transfer(bands: &[[f64; TERMS]], l: [f64; 3], strength: f64) -> f64 {
     let terms = bands.iter().flatten().zip(basis(l).into_iter().flatten());
-    (1.0 + reach * terms.map(|(x, y)| x * y).sum::<f64>()).max(0.0)
+    (1.0 + strength * terms.map(|(x, y)| x * y).sum::<f64>()).max(0.0)
 }
 
 #[cfg(test)]

@@ -180,7 +180,7 @@ impl World {
         let (mut r, mut t) = if thin {
             (Vec3::from(colours.reflectance), Vec3::from(colours.transmittance))
         } else {
-            (Vec3::from(colours.bark), Vec3::ZERO)
+            (Vec3::from(colours.bark_reflectance), Vec3::ZERO)
         };
         // No tint makes a surface scatter more than it gets.
         let tint = (Vec3::splat(tree.tint)).min((r + t).max(Vec3::splat(1e-6)).recip());

@@ -28,7 +28,7 @@ pub fn evaluate(gpu: &Gpu, function: Function, arguments: &[Arguments]) -> Vec<W
 pub fn dispatch<T: bytemuck::Pod>(
     gpu: &Gpu,
     shader: &'static Shader,
-    constants: &[(u32, u32)],
+    constants: &[(&str, u32)],
     resources: &[(&str, Resource)],
     count: usize,
     more: &[u32],

@@ -92,7 +92,7 @@ fn cameras_where_no_camera_belongs() {
     let gpu = device::open();
     let scene = grove(DAY);
     // In the very middle of a tree's box there is no direction to it.
-    let centre = f64::from(device::bake(&scene)[0].species.center);
+    let centre = f64::from(device::bake(&scene)[0].species.crown.frame.centre);
     let cases = [
         ("the centre of a crown", device::camera([50.0, 50.0, centre], [60.0, 60.0, 8.0])),
         ("inside a crown", device::camera([50.0, 50.0, 8.0], [60.0, 60.0, 8.0])),

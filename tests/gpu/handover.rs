@@ -10,19 +10,19 @@ const EPS: f64 = 6e-8;
 fn trees_fade_and_the_shader_map_takes_over_as_the_oracle_says() {
     let gpu = device::open();
     let mut cases: Vec<[f32; 3]> = Vec::new();
-    let reaches =
+    let distances =
         (0..=300).map(|k| k as f32 / 200.0).chain([1e-30, 0.799_999_9, 0.8, 1.0, 1.000_000_1, 1e6, 1e30]);
-    for (k, reach) in reaches.enumerate() {
+    for (k, relative) in distances.enumerate() {
         let end = [0.1, 0.5, 0.6, 0.8][k % 4];
-        cases.extend([0.0, 0.3, 0.5, 0.999_999_94].map(|u| [reach, end, u]));
+        cases.extend([0.0, 0.3, 0.5, 0.999_999_94].map(|u| [relative, end, u]));
     }
     let arguments: Vec<Arguments> = cases.iter().map(|c| words(c)).collect();
     let (mut nu, mut over, mut fade) = (Worst::default(), Worst::default(), Worst::default());
     for (c, out) in cases.iter().zip(evaluate(&gpu, Function::Handover, &arguments)) {
-        let [reach, end, u] = c.map(f64::from);
-        nu.note((float(&out, 0) - handover::converged(reach, end)).abs(), || format!("{c:?}"));
-        over.note((float(&out, 1) - handover::handed_over(reach)).abs(), || format!("{c:?}"));
-        fade.note((float(&out, 2) - handover::tree_fade(reach, u)).abs(), || format!("{c:?}"));
+        let [relative, end, u] = c.map(f64::from);
+        nu.note((float(&out, 0) - handover::converged(relative, end)).abs(), || format!("{c:?}"));
+        over.note((float(&out, 1) - handover::handed_over(relative)).abs(), || format!("{c:?}"));
+        fade.note((float(&out, 2) - handover::tree_fade(relative, u)).abs(), || format!("{c:?}"));
         assert!((0..3).all(|k| (0.0..=1.0).contains(&float(&out, k))), "{c:?} {out:?}");
     }
     // t to 2.5 ulp, times the largest slope 1.5, and four operations on numbers up to 3.

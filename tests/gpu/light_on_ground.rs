@@ -179,11 +179,11 @@ fn a_ridge_and_a_tree_throw_their_shadows_away_from_the_sun() {
     let bake = &device::bake(&scene)[0].species;
     println!(
         "shadow of {area:.1} m2 at {centre:?}; the tree covers {} m2, {} m high",
-        bake.area, bake.height
+        bake.area, bake.crown.height
     );
     // At 45 degrees what is at a height falls as far to the west; crowns of birches are at a third to all of it. What
     // the crown itself hides of its shadow is near the trunk, so the centre lies farther out than the crown's, if at all.
-    let height = f64::from(bake.height);
+    let height = f64::from(bake.crown.height);
     assert!(centre[0] < -0.3 * height && centre[0] > -height, "{centre:?}");
     assert!(centre[1].abs() < 1.0, "{centre:?}");
     assert!(area > 0.3 * f64::from(bake.area), "{area}");

@@ -15,6 +15,7 @@ mod light;
 mod light_on_ground;
 mod paths;
 mod plan;
+mod program;
 mod seeds;
 mod shader_map;
 mod silhouettes;

@@ -102,7 +102,7 @@ fn oracle(
     let (mut from_sun, mut from_sky) = ([0.0; 4], [0.0; 4]);
     for c in 0..3 {
         let (r, t, b) =
-            (f64::from(row.reflectance[c]), f64::from(row.transmittance[c]), f64::from(row.bark[c]));
+            (f64::from(row.reflectance[c]), f64::from(row.transmittance[c]), f64::from(row.bark_ratio[c]));
         let turned = light::turned_reflectance(row.turning.into(), angle);
         let full = light::leaf_phase(angle, r * turned, t) * hotspot * E[c];
         from_sun[c] =
@@ -201,16 +201,16 @@ fn fractions_are_shares_of_a_pixel_at_every_distance() {
         for eye in &eyes[..if how == Representation::ZField { 2 } else { 4 }] {
             let (report, _) = renderer.render_eye(eye, 1.0).unwrap();
             let l = renderer.picture().unwrap().linear.unwrap();
-            let (mut mean, reach) = ([0.0; 4], eye.position[2] / 35f64.to_radians().cos() / range);
+            let (mut mean, relative) = ([0.0; 4], eye.position[2] / 35f64.to_radians().cos() / range);
             for f in &l.fractions {
-                assert!(f.iter().all(|v| (0.0..=1.0).contains(v)), "{how:?} {reach}: {f:?}");
+                assert!(f.iter().all(|v| (0.0..=1.0).contains(v)), "{how:?} {relative}: {f:?}");
                 let sum: f64 = f.iter().map(|v| f64::from(*v)).sum();
                 // Half floats of what each sample has, and of their mean, rounded either way.
-                assert!((sum - 1.0).abs() <= 2.0 / 1024.0, "{how:?} {reach}: {f:?}");
+                assert!((sum - 1.0).abs() <= 2.0 / 1024.0, "{how:?} {relative}: {f:?}");
                 (0..4).for_each(|k| mean[k] += f64::from(f[k]) / l.fractions.len() as f64);
             }
-            println!("{how:?} at {reach:.2} of the range: {} trees, {mean:.3?}", report.trees.camera);
-            assert!(mean.iter().all(|f| *f > 0.02), "{how:?} {reach}: {mean:?}");
+            println!("{how:?} at {relative:.2} of the range: {} trees, {mean:.3?}", report.trees.camera);
+            assert!(mean.iter().all(|f| *f > 0.02), "{how:?} {relative}: {mean:?}");
             shown.push(report.trees.camera);
         }
     }
@@ -345,11 +345,11 @@ fn near_and_far_forests_are_equally_bright() {
     let camera = scene.cameras[0].clone();
     let plan = Plan::new(&scene, &camera, SIZE, false, Some(gpu.info())).unwrap();
     let method = Method { patches: 4, side: 50.0, pixels: 64 };
-    let seen = |reach: f64| {
+    let seen = |relative: f64| {
         let request = Request {
             sun_zenith: 40.0,
             slope: 0.0,
-            distance: reach * plan.range,
+            distance: relative * plan.range,
             representation: Representation::Auto,
             views: vec![[0.0, 0.0], [40.0, 0.0], [-40.0, 0.0], [30.0, 90.0]],
         };

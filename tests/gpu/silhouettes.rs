@@ -299,7 +299,7 @@ fn quads_are_dropped_from_the_far_end_when_regions_are_few() {
         (report.seed_quads, report.trees.camera)
     };
     let mut none = full.clone();
-    none.silhouette_reach = 1.0;
+    none.silhouette_ratio = 1.0;
     let (near, fewest) = draw(none);
     let (quads, most) = draw(full.clone());
     assert!(quads > near + 1 && most > fewest, "{near} {quads}");

@@ -217,7 +217,7 @@ fn lookups_are_those_of_the_oracle_within_half_floats_and_filters() {
         let found: Vec<[[f32; 4]; 3]> = dispatch(
             &gpu,
             &shaders::PROBE_TABLES_COMP,
-            &[(0, (n as f32).to_bits()), (1, (m as f32).to_bits())],
+            &[("TABLE_ANGLES", (n as f32).to_bits()), ("TABLE_DENSITIES", (m as f32).to_bits())],
             &[
                 ("places", Resource::Buffer(&buffer)),
                 ("pair_table", Resource::Texture(&data.pairs, Sampler::Linear)),

@@ -63,7 +63,7 @@ fn a_tree_stands_where_it_should_and_is_as_large_as_its_model() {
     let gpu = device::open();
     let scene = scene(0.0, 210.0);
     let bake = bake(&scene);
-    let (radius, height) = (f64::from(bake.radius), f64::from(bake.height));
+    let (radius, height) = (f64::from(bake.crown.frame.half_width), f64::from(bake.crown.height));
     for (distance, degrees, z) in
         [(25.0, 0.0, 7.0), (25.0, 130.0, 30.0), (40.0, 250.0, 2.0), (20.0, 45.0, 40.0)]
     {
@@ -90,7 +90,7 @@ fn a_tree_stands_where_it_should_and_is_as_large_as_its_model() {
         assert!(100 * outside <= all.len(), "{outside} of {} pixels show a tree where none is", all.len());
         // The leading shoot is thinner than a texel (2 half heights sqrt 2 / 32): at one sample a pixel the topmost two or
         // three are under this tree's one threshold of opacity.
-        let texel = f64::from(bake.half_height) * 2.0 * std::f64::consts::SQRT_2 / 32.0;
+        let texel = f64::from(bake.crown.frame.half_height) * 2.0 * std::f64::consts::SQRT_2 / 32.0;
         assert!((high - height).abs() < 3.0 * texel, "its top is at {high} m, not {height} m");
         // The side that is seen is towards the camera, and no farther than the crown is wide.
         let (s, c) = degrees.to_radians().sin_cos();

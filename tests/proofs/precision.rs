@@ -45,7 +45,7 @@ fn few_bits_cost_less_than_is_seen() {
     let (_, baked) = oaks(0.02, "table_angles = 6\ntable_densities = 4\ntable_rays = 64\n");
     println!("| quantity | 8 bits | 16 bits | half | used |\n|---|---|---|---|---|");
     let species = &baked[0].species;
-    z_fields(&species.views, f64::from(species.radius));
+    z_fields(&species.views, f64::from(species.crown.frame.half_width));
     light_transfer(&species.transfer);
     forest_tables(&baked[0].tables);
     coverage();
@@ -111,7 +111,7 @@ fn light_transfer(t: &Transfer) {
         let m = |f: &dyn Fn([f64; 4]) -> [f64; 4]| {
             let bands: Vec<[f64; 4]> = exact.iter().map(|x| f(*x)).collect();
             // At a phase angle of 1 rad.
-            transfer::transfer(&bands, l, transfer::reach(1.0))
+            transfer::transfer(&bands, l, transfer::strength(1.0))
         };
         let truth = m(&|x| x);
         let finer = transfer::STEP / 256.0;

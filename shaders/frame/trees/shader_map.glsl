@@ -32,23 +32,23 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         TableForest t = table_forest(pair_table, view_table, v, view.v.sun_direction, n, s.vertical_scale, x, s.max_thickness,
                                      float(k), TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES);
         vec2 g = table_ground(view_table, table_density(x, s.max_thickness, TABLE_DENSITIES), float(k), TABLE_ANGLES, TABLE_DENSITIES);
-        float path = share * t.seen, reach = distance / s.range, part = path * handed_over(reach);
+        float path = share * t.seen, relative = distance / s.range, part = path * handed_over(relative);
         f.seen += path;
         f.over += part;
-        f.converged += path * converged(reach, view.v.convergence);
+        f.converged += path * converged(relative, view.v.convergence);
         f.seen_coverage += share * t.coverage;
         f.sky -= share * log(max(g.x, 1e-6));
         f.gap -= share * log(max(1.0 - g.y, 1e-6));
         // Where nothing is handed over yet no tree is shown, but the mix must stay defined.
         float weight = max(part, 1e-6 * path);
         vec3 leaf = (0.25 * (1.0 + n.z)) * s.albedo * view.v.sky_radiance;
-        f.tree_sky += weight * leaf * (t.sky.x + t.sky.y * s.bark);
+        f.tree_sky += weight * leaf * (t.sky.x + t.sky.y * s.bark_ratio);
         if (PAIR_TABLES) {
             f.joint += share * t.joint;
             vec3 lit = turned_reflectance(s.reflectance, s.turning, angle_between(v, view.v.sun_direction));
             vec3 full = leaf_phase(v, view.v.sun_direction, lit, s.transmittance) * view.v.sun_irradiance;
             weight *= sun_facing(view.v.sun_direction, n);
-            f.tree_sun += weight * t.transfer * full * (t.sun.x + t.sun.y * s.bark);
+            f.tree_sun += weight * t.transfer * full * (t.sun.x + t.sun.y * s.bark_ratio);
             f.tree_lit += weight * (t.sun.x + t.sun.y);
         }
     }

@@ -15,8 +15,8 @@ layout(std430, binding = 2) readonly buffer Lists { uint items[]; } lists;
 layout(std140, binding = 3) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
 layout(std430, binding = 4) readonly buffer Bases { ViewBasis items[]; } bases;
 layout(std430, binding = 5) readonly buffer Masks { uvec4 items[]; } masks;
-layout(constant_id = 0) const int RINGS = 9;
-layout(constant_id = 1) const float RESOLUTION = 256.0;
+layout(constant_id = 0) const int VIEW_RINGS = 9;
+layout(constant_id = 1) const float VIEW_RESOLUTION = 256.0;
 layout(constant_id = 2) const uint MASK_ROWS = 12u;
 
 layout(location = 0) out vec4 view_p[3];        // in the three views; w of the first: height in the tree
@@ -32,9 +32,9 @@ layout(location = 19) flat out vec4 sun;        // w: 1 / r2 of the hole
 layout(location = 20) flat out vec4 sky;        // w: metres from the centre to the top
 layout(location = 21) flat out uvec4 tree_bits; // mask row; cascade | from below << 4 | species << 8
 layout(location = 22) flat out vec2 own;       // dither, c of the self-shadow times the root of the phase angle
-layout(location = 23) flat out vec4 bark;       // relative colour; w: height under which there is only bark
+layout(location = 23) flat out vec4 bark_ratio; // relative colour; w: height under which there is only bark
 layout(location = 24) flat out vec4 mean_sun;   // average light, times nu; w: 1 - nu
-layout(location = 26) flat out vec4 sun_from;   // in the tree's own axes; w: reach of light transfer
+layout(location = 26) flat out vec4 sun_from;   // in the tree's own axes; w: strength of light transfer
 layout(location = 25) flat out vec4 mean_sky;   // w: average lit fraction, times nu
 
 void main() {
@@ -54,12 +54,12 @@ void main() {
     float far = max(length(c), 1e-6);
     vec3 w = c / far, right, up;
     frame_across(w, right, up);
-    float reach = length(w.xy) + abs(w.z);
+    float support = length(w.xy) + abs(w.z);
     vec4 extent = tree_bounds(bases.items[uint(layers.x)].bounds, bases.items[uint(layers.y)].bounds,
-                              bases.items[uint(layers.z)].bounds, w, below, RINGS);
-    extent *= far / max(far - reach, 0.1 * far);
+                              bases.items[uint(layers.z)].bounds, w, below, VIEW_RINGS);
+    extent *= far / max(far - support, 0.1 * far);
     // Half a texel of the mip in use, so that bilinear edges are not cut.
-    vec2 margin = exp2(t.mip) / RESOLUTION * vec2(1.0, reach);
+    vec2 margin = exp2(t.mip) / VIEW_RESOLUTION * vec2(1.0, support);
     uint corner = gl_VertexIndex & 3u;
     vec3 p = right * ((corner & 1u) == 0u ? extent.x - margin.x : extent.y + margin.x) +
              up * ((corner & 2u) == 0u ? extent.z - margin.y : extent.w + margin.y);
@@ -87,13 +87,13 @@ void main() {
     weights = vec4(t.view_weights, t.light_weights);
     // The model's metres: what is in a crown grows with it.
     float phase_angle = angle_between(-t.centre, v.sun_direction);
-    sun_from = vec4(toward, transfer_reach(sqrt(phase_angle)));
+    sun_from = vec4(toward, transfer_strength(sqrt(phase_angle)));
     optics = vec4(t.mip, kind.extinction * phase_angle / t.scale, t.fade, c.z);
     sun = vec4(t.sun, t.hole);
     sky = vec4(t.sky, half_extent.z);
     uvec3 row = masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz;
     tree_bits = uvec4(row, t.cascade | (below ? 16u : 0u) | t.species << 8u);
-    bark = vec4(kind.bark, kind.crown_base);
+    bark_ratio = vec4(kind.bark_ratio, kind.bare_below);
     mean_sun = vec4(t.mean_sun, t.own);
     mean_sky = vec4(t.mean_sky, t.mean_lit);
     own = vec2(unit(hash(t.identity ^ HASH_DITHER)), kind.leaf_shadow * sqrt(phase_angle));

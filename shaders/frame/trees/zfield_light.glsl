@@ -8,14 +8,14 @@ struct TreeLight {
     vec3 mean_sky;      // average radiance from the sky, times nu
     float mean_lit;     // average lit fraction, times nu
     float own;          // 1 - nu: weight of the tree's own light
-    vec3 bark;          // reflectance of bark over that of leaves
-    float crown_base;   // height under which there is only bark
+    vec3 bark_ratio;    // reflectance of bark over that of leaves
+    float bare_below;   // height under which there is only bark
     float half_height;  // metres from the centre to the top
     float hole;         // 1 / squared radius of the hole around it, 1/m2
     float leaf;         // c of the self-shadow times the root of the phase angle
     float extinction;   // tau of the self-shadow times the phase angle, 1/m
     vec3 toward;        // the sun, in the tree's own axes
-    float transfer;     // reach of light transfer
+    float transfer;     // strength of light transfer
     uint cascade;       // for shadow lookups; MAX_CASCADES: none
 };
 
@@ -69,7 +69,7 @@ TreeParts tree_light(sampler2DArray views, sampler2DArray shadow_map, sampler2DA
                      float height, LightRay ray, LightQuality quality) {
     TreeParts light = TreeParts(t.mean_sun, t.mean_sky, quality.sun ? t.mean_lit : 0.0);
     // Under the crown there is only bark; half a metre or so of transition.
-    vec3 colour = t.own * mix(t.bark, vec3(1.0), smoothstep(t.crown_base - 0.05, t.crown_base + 0.05, height));
+    vec3 colour = t.own * mix(t.bark_ratio, vec3(1.0), smoothstep(t.bare_below - 0.05, t.bare_below + 0.05, height));
     if (quality.sun) {
         float metres = quality.iterations > 0 ? light_entry(views, ray, mip, quality.iterations, magnified) : 0.0;
         float through = self_shadow(t.leaf, t.extinction, metres);

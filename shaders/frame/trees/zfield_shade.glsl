@@ -20,10 +20,10 @@ layout(location = 19) flat in vec4 sun;
 layout(location = 20) flat in vec4 sky;
 layout(location = 21) flat in uvec4 tree_bits;
 layout(location = 22) flat in vec2 own; // dither, c of the self-shadow times the root of the phase angle
-layout(location = 23) flat in vec4 bark;
+layout(location = 23) flat in vec4 bark_ratio;
 layout(location = 24) flat in vec4 mean_sun;
 layout(location = 25) flat in vec4 mean_sky;
-layout(location = 26) flat in vec4 sun_from; // in the tree's own axes; w: reach of light transfer
+layout(location = 26) flat in vec4 sun_from; // in the tree's own axes; w: strength of light transfer
 
 layout(binding = 6) uniform sampler2DArray views;
 layout(binding = 7) uniform sampler2DArray shadow_map;
@@ -70,7 +70,7 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
     ray.weights = vec3(weights.zw, 1.0 - weights.z - weights.w);
     ray.entry = mix(shadow_p, shadow_c.xyz, s);
     ray.deeper = shadow_c.w;
-    TreeLight tree = TreeLight(sun.rgb, sky.rgb, mean_sun.rgb, mean_sky.rgb, mean_sky.w, mean_sun.w, bark.rgb, bark.w, sky.w,
+    TreeLight tree = TreeLight(sun.rgb, sky.rgb, mean_sun.rgb, mean_sky.rgb, mean_sky.w, mean_sun.w, bark_ratio.rgb, bark_ratio.w, sky.w,
                                sun.w, own.y, optics.y, sun_from.xyz, sun_from.w, tree_bits.w & 15u);
     TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, tree, at, p, d, layers, below, optics.x, MAGNIFIED, s,
                                  mix(view_p[0].w, optics.w, s), ray, LightQuality(HAS_SUN, LIGHT_ITERATIONS, TRANSFER_BANDS));

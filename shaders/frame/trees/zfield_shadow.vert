@@ -13,8 +13,8 @@ layout(std430, binding = 2) readonly buffer Lists { uint items[]; } lists;
 layout(std140, binding = 3) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
 layout(std430, binding = 4) readonly buffer Bases { ViewBasis items[]; } bases;
 layout(push_constant) uniform Push { uint cascade; };
-layout(constant_id = 0) const int RINGS = 9;
-layout(constant_id = 1) const float RESOLUTION = 256.0;
+layout(constant_id = 0) const int VIEW_RINGS = 9;
+layout(constant_id = 1) const float VIEW_RESOLUTION = 256.0;
 
 layout(location = 0) out vec3 light_p[3];
 layout(location = 3) out float depth;
@@ -31,12 +31,12 @@ void main() {
     vec3 l = (tree_rotation(t) * v.sun_direction) / half_extent;
     vec3 w = normalize(l), right, up;
     frame_across(w, right, up);
-    float mip = clamp(floor(log2(RESOLUTION * v.cascade_texel[cascade] /
-                                 (2.0 * max(half_extent.x, half_extent.z))) + 0.5), 0.0, log2(RESOLUTION));
+    float mip = clamp(floor(log2(VIEW_RESOLUTION * v.cascade_texel[cascade] /
+                                 (2.0 * max(half_extent.x, half_extent.z))) + 0.5), 0.0, log2(VIEW_RESOLUTION));
     vec3 layers = unpack_layers(t.light_layers, kind.first_layer);
     vec4 extent = tree_bounds(bases.items[uint(layers.x)].bounds, bases.items[uint(layers.y)].bounds,
-                              bases.items[uint(layers.z)].bounds, w, false, RINGS);
-    vec2 margin = exp2(mip) / RESOLUTION * vec2(1.0, length(w.xy) + w.z);
+                              bases.items[uint(layers.z)].bounds, w, false, VIEW_RINGS);
+    vec2 margin = exp2(mip) / VIEW_RESOLUTION * vec2(1.0, length(w.xy) + w.z);
     vec3 p = right * ((gl_VertexIndex & 1) == 0 ? extent.x - margin.x : extent.y + margin.x) +
              up * ((gl_VertexIndex & 2) == 0 ? extent.z - margin.y : extent.w + margin.y);
     mat4 shadow = v.cascade_from_world[cascade];

@@ -5,65 +5,13 @@
 //! the point a·right + b·up where it meets the plane through the centre across w; depths count from there along w.
 
 use crate::bake::SpeciesBake;
+use crate::physics::crown::Crown;
 use crate::physics::transfer::TERMS;
-
-/// Proportions and optics of a tree of scale 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shape {
-    /// Height of the centre of the scaled space, m.
-    pub center: f32,
-    /// Half extent in x and y, m.
-    pub radius: f32,
-    /// Half extent in z, m.
-    pub half_height: f32,
-    /// Half width of the crown, m.
-    pub crown_radius: f32,
-    /// Height of the crown's base, m.
-    pub crown_base: f32,
-    /// Height of the tree, m.
-    pub height: f32,
-    /// c and τ of the crown's self-shadow ([`crate::physics::light::self_shadow`]), 1/√rad and 1/(m rad).
-    pub leaf_shadow: f32,
-    /// See there.
-    pub extinction: f32,
-    /// Of its leaves.
-    pub leaf: LeafOptics,
-}
-
-impl Shape {
-    /// The proportions of a baked species.
-    pub fn of(bake: &SpeciesBake) -> Self {
-        Shape {
-            center: bake.center,
-            radius: bake.radius,
-            half_height: bake.half_height,
-            crown_radius: bake.crown_radius,
-            crown_base: bake.crown_base,
-            height: bake.height,
-            leaf_shadow: bake.leaf_shadow,
-            extinction: bake.extinction,
-            leaf: LeafOptics::of(bake),
-        }
-    }
-
-    /// k of S = diag(1, 1, k): crown diameter over crown height.
-    pub fn vertical_scale(&self) -> f64 {
-        let height = f64::from(self.height);
-        2.0 * f64::from(self.crown_radius) / (height - f64::from(self.crown_base)).max(1e-3 * height)
-    }
-
-    /// Share of bark, in [0, 1], at a height of the scaled space: there is nothing else under the crown.
-    pub fn bark(&self, z: f32) -> f32 {
-        let base = (self.crown_base - self.center) / self.half_height;
-        let t = ((z - (base - 0.05)) / 0.1).clamp(0.0, 1.0);
-        1.0 - t * t * (3.0 - 2.0 * t)
-    }
-}
 
 /// What leaves do with light, luminances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeafOptics {
-    /// Reflectance and transmittance of the leaves that scatter the sun as the crown does ([`SpeciesBake::crown`]).
+    /// Reflectance and transmittance of the leaves that scatter the sun as the crown does ([`SpeciesBake::crown_leaves`]).
     pub scattered: [f32; 2],
     /// Change of the reflectance with the phase angle, 1/rad.
     pub turning: f32,
@@ -72,9 +20,10 @@ pub struct LeafOptics {
 }
 
 impl LeafOptics {
-    fn of(bake: &SpeciesBake) -> Self {
+    /// Of a baked species.
+    pub fn of(bake: &SpeciesBake) -> Self {
         LeafOptics {
-            scattered: bake.crown().map(luminance),
+            scattered: bake.crown_leaves().map(luminance),
             turning: bake.turned.slope_of(),
             albedo: luminance(bake.sky_albedo()),
         }
@@ -111,22 +60,25 @@ pub struct Cast {
 pub struct TransferAt(pub [f32; 2 * TERMS]);
 
 impl TransferAt {
-    /// M for light from a unit vector in the tree's own axes, with w = `reach`.
+    /// M for light from a unit vector in the tree's own axes, with w = `strength`.
     #[inline]
-    pub fn of(&self, [x, y, z]: [f32; 3], reach: f32) -> f32 {
+    pub fn of(&self, [x, y, z]: [f32; 3], strength: f32) -> f32 {
         let terms = [1.0, x, y, z, x * y, y * z, x * z, x * x - y * y];
         let sum: f32 = self.0.iter().zip(terms).map(|(c, y)| c * y).sum();
-        (1.0 + reach * sum).max(0.0)
+        (1.0 + strength * sum).max(0.0)
     }
 }
 
 /// A crown that rays can be cast at.
-pub trait Crown: Sync {
+pub trait CrownModel: Sync {
     /// All that is the same for parallel rays.
     type Aim: Send + Sync;
 
-    /// The tree's proportions.
-    fn shape(&self) -> &Shape;
+    /// The tree's proportions and self-shadow.
+    fn crown(&self) -> &Crown;
+
+    /// What its leaves do with light.
+    fn leaf(&self) -> &LeafOptics;
 
     /// Prepares rays along w, by its zenith angle in [0, π/2) and azimuth, rad, in the scaled space.
     fn aim(&self, zenith: f64, azimuth: f64) -> Self::Aim;

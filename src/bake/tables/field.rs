@@ -3,8 +3,9 @@
 
 use std::f32::consts::SQRT_2;
 
-use super::crown::{Cast, Crown, Seen, Shape, TransferAt};
+use super::crown::{Cast, CrownModel, LeafOptics, Seen, TransferAt};
 use crate::bake::SpeciesBake;
+use crate::physics::crown::Crown;
 use crate::physics::transfer::{self, TERMS};
 use crate::physics::views::{self, Basis};
 use crate::physics::zfield::AGREEMENT;
@@ -155,7 +156,8 @@ impl TransferLevel {
 
 /// A z-field to cast rays at.
 pub struct FieldCrown {
-    shape: Shape,
+    crown: Crown,
+    leaf: LeafOptics,
     rings: u32,
     border: f64,
     fine: Level,
@@ -180,7 +182,8 @@ impl FieldCrown {
         let level = Self::level(bake, resolution);
         let r = f64::from(bake.views.resolution);
         FieldCrown {
-            shape: Shape::of(bake),
+            crown: bake.crown,
+            leaf: LeafOptics::of(bake),
             rings: bake.views.n,
             border: r / (r - 2.0),
             fine: Level::new(bake, level),
@@ -231,11 +234,15 @@ impl FieldCrown {
     }
 }
 
-impl Crown for FieldCrown {
+impl CrownModel for FieldCrown {
     type Aim = FieldAim;
 
-    fn shape(&self) -> &Shape {
-        &self.shape
+    fn crown(&self) -> &Crown {
+        &self.crown
+    }
+
+    fn leaf(&self) -> &LeafOptics {
+        &self.leaf
     }
 
     fn aim(&self, zenith: f64, azimuth: f64) -> FieldAim {

@@ -1,8 +1,9 @@
 //! From estimates to tables: logarithms, and what theory says of them.
 
-use super::crown::Shape;
+use super::crown::LeafOptics;
 use super::measure::{Estimate, Measured, PairEstimate};
 use super::{ForestSettings, mean_area, sky};
+use crate::physics::crown::Crown;
 use crate::physics::tables::ForestTables;
 use crate::physics::tables::{density_node, light_node, secant, zenith_node};
 
@@ -27,21 +28,25 @@ fn thickness(estimates: &[Estimate], nodes: &[f64], least: &[f64], growth: &[f64
 }
 
 /// Makes the tables.
-pub fn tables(shape: &Shape, forest: &ForestSettings, measured: &Measured) -> ForestTables {
+pub fn tables(
+    (crown, leaf): (&Crown, &LeafOptics),
+    forest: &ForestSettings,
+    measured: &Measured,
+) -> ForestTables {
     let (n, m) = (forest.angles as usize, forest.densities as usize);
-    let area = mean_area(shape, forest.scale_range);
+    let area = mean_area(crown, forest.scale_range);
     let max_thickness = forest.pattern_density * area;
     let nodes: Vec<f64> = (0..m).map(|j| density_node(m, j, max_thickness)).collect();
     // Nothing is thinner than this, so that all that is divided by has a value.
     let (least, even) = (vec![1e-6; m], vec![1.0; m]);
-    let full = forest.measured_density(shape) * area;
+    let full = forest.measured_density(crown) * area;
     let limit = |x: usize, e: Estimate| if x == 0 { (e.0 / full, e.1) } else { e };
     let mut t = ForestTables {
         angles: forest.angles,
         densities: forest.densities,
         max_thickness: max_thickness as f32,
         area: area as f32,
-        vertical_scale: shape.vertical_scale() as f32,
+        vertical_scale: crown.vertical_scale() as f32,
         hole: 0.0,
         sky: [1.0, 0.0],
         pair: vec![[0.0; 4]; m * n * n * n],
@@ -88,7 +93,7 @@ pub fn tables(shape: &Shape, forest: &ForestSettings, measured: &Measured) -> Fo
             }
         }
     }
-    sky::fill(&mut t, &measured.sky, &shape.leaf, forest);
+    sky::fill(&mut t, &measured.sky, leaf, forest);
     t
 }
 

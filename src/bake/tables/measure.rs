@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use rayon::prelude::*;
 
 use super::ForestSettings;
-use super::crown::{Crown, TransferAt};
+use super::crown::{CrownModel, TransferAt};
 use super::patch::{Patch, Segment, TURNS, patches};
 use super::sky::SkySeen;
 use super::statistics::{Moments, Sequence, mean, product, ratio};
@@ -97,8 +97,8 @@ struct Split<const M: usize>([Lanes<M>; 2]);
 
 impl<const M: usize> Split<M> {
     #[inline]
-    fn add(&mut self, weight: &Lanes<M>, light: f32, bark: f32) {
-        let [leaf, wood] = [light * (1.0 - bark), light * bark];
+    fn add(&mut self, weight: &Lanes<M>, light: f32, bark_share: f32) {
+        let [leaf, wood] = [light * (1.0 - bark_share), light * bark_share];
         for (x, w) in weight.iter().enumerate() {
             self.0[0][x] += w * leaf;
             self.0[1][x] += w * wood;
@@ -142,7 +142,7 @@ struct CrownPoint<const M: usize> {
     side: f64,
     /// Visibility over the probability of choosing it.
     weight: Lanes<M>,
-    bark: f32,
+    bark_share: f32,
     transfer: TransferAt,
     /// Crowns in front, of one in [`OWN`] points: the others are looked at for light through their own crown only.
     front: Option<Vec<(u32, f32)>>,
@@ -191,22 +191,22 @@ fn turn(u: f64) -> f64 {
 
 /// Measures everything for a crown, on all threads of the current rayon pool; the same bits for any number of them. M is the
 /// number of densities or more.
-pub fn measure<C: Crown, const M: usize>(
+pub fn measure<C: CrownModel, const M: usize>(
     crown: &C,
     forest: &ForestSettings,
     progress: &Progress,
 ) -> Measured {
     let (n, m) = (forest.angles as usize, forest.densities as usize);
-    let full = forest.measured_density(crown.shape());
+    let full = forest.measured_density(crown.crown());
     let share = |j: usize| density_node(m, j, forest.pattern_density) / full;
     let q = std::array::from_fn(|j| if j < m { share(j) as f32 } else { 0.0 });
     let scene = Scene::<C, M> {
         crown,
         forest,
-        patches: patches(crown.shape(), forest, PATCHES),
+        patches: patches(crown.crown(), forest, PATCHES),
         q,
         density: q.map(|q| q * full as f32),
-        vertical_scale: crown.shape().vertical_scale(),
+        vertical_scale: crown.crown().vertical_scale(),
         largest: forest.scale_range[1],
         grounds: forest.rays.div_ceil(PATCHES as u32 * CROWNS_PER_GROUND),
         crowns: forest.rays.div_ceil(PATCHES as u32),
@@ -237,7 +237,7 @@ pub fn measure<C: Crown, const M: usize>(
     measured
 }
 
-impl<C: Crown, const M: usize> Scene<'_, C, M> {
+impl<C: CrownModel, const M: usize> Scene<'_, C, M> {
     fn densities(&self) -> usize {
         self.forest.densities as usize
     }
@@ -259,7 +259,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
     /// Trees whose disc covers a ground point.
     fn discs(&self, patch: &Patch, position: [f32; 2], discs: &mut Vec<u32>) {
         discs.clear();
-        let radius = self.crown.shape().crown_radius;
+        let radius = self.crown.crown().radius;
         let segment =
             Segment { origin: position, along: [1.0, 0.0], length: 0.0, reach: radius * self.largest };
         patch.visit(&segment, |tree, d| {
@@ -402,7 +402,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
     /// probabilities ∝ the mean over densities of their share of Σ a, so that all count about the same at every density.
     fn crown_points(&self, p: usize, heading: &Heading<C::Aim>) -> (Vec<CrownPoint<M>>, SkySeen) {
         let patch = &self.patches[p];
-        let shape = self.crown.shape();
+        let shape = self.crown.crown();
         let (mut sky, full) = (SkySeen::default(), self.densities() - 1);
         let (mut hits, mut seen): (Vec<Hit>, Vec<SeenCrown<M>>) = (Vec::new(), Vec::new());
         let mut total = [0.0; M];
@@ -425,7 +425,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                 add(&mut total, &weight);
                 seen.push(SeenCrown { hit: *h, weight, ray: i, first, position, angle });
                 let scale = patch.trees[h.tree as usize].scale;
-                let below_top = (1.0 - h.height).max(0.0) * shape.half_height * scale;
+                let below_top = (1.0 - h.height).max(0.0) * shape.frame.half_height * scale;
                 sky.note([weight[0], weight[full]], h.occlusion, self.density[full] * below_top * below_top);
             }
         }
@@ -448,7 +448,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                     azimuth: s.angle,
                     side: side(CROWNS, p, s.ray),
                     weight: s.weight.map(|w| (f64::from(w) / share) as f32),
-                    bark: shape.bark(s.hit.height),
+                    bark_share: shape.bark_share(s.hit.height),
                     transfer: heading.transfer(self.crown, &s.hit),
                     front: (points.len() % OWN as usize == OWN as usize / 2)
                         .then(|| seen[s.first..index].iter().map(|f| (f.hit.tree, f.hit.alpha)).collect()),
@@ -464,7 +464,7 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
         let heading = Heading::new(self.crown, theta_l, self.vertical_scale);
         let angles: Vec<f32> =
             (0..n).map(|k| points.heading.angle_to(&heading, azimuth_node(n, k)) as f32).collect();
-        let reach: Vec<f32> = angles.iter().map(|a| transfer::reach(f64::from(*a)) as f32).collect();
+        let strength: Vec<f32> = angles.iter().map(|a| transfer::strength(f64::from(*a)) as f32).collect();
         let mut marks = Marks::new(self.patches.iter().map(|p| p.trees.len()).max().unwrap_or(0));
         // By patch: the mean share of lit ground; by azimuth and patch, sums of y, t_l, and lit leaves and bark.
         let lit: Vec<[f64; M]> = (0..PATCHES).map(|p| self.lit(p, &heading, &mut marks)).collect();
@@ -508,18 +508,18 @@ impl<C: Crown, const M: usize> Scene<'_, C, M> {
                     let trees = &mut trees[p];
                     let azimuth = Azimuth::new(c.azimuth + c.side * azimuth_node(n, k));
                     let (own, entry) = own(self.crown, patch, &heading, &azimuth, (&c.receiver, angles[k]));
-                    trees.isolated.add(&c.weight, own, c.bark);
+                    trees.isolated.add(&c.weight, own, c.bark_share);
                     if c.front.is_none() {
                         continue;
                     }
                     let receiver = (&c.receiver, entry, &marks);
                     let light: Light<M> =
                         light(self.crown, patch, &heading, &azimuth, receiver, &self.q, self.largest);
-                    trees.sampled.add(&c.weight, own, c.bark);
+                    trees.sampled.add(&c.weight, own, c.bark_share);
                     let weight = std::array::from_fn(|x| c.weight[x] * light.joint[x]);
-                    trees.lit.add(&weight, own, c.bark);
+                    trees.lit.add(&weight, own, c.bark_share);
                     let toward = c.receiver.tree.map_or([0.0, 0.0, 1.0], |t| heading.toward(&azimuth, &t));
-                    let transfer = c.transfer.of(toward, reach[k]);
+                    let transfer = c.transfer.of(toward, strength[k]);
                     add(&mut trees.transferred, &weight.map(|w| w * own * transfer));
                 }
             }

@@ -15,10 +15,11 @@ mod statistics;
 mod store;
 mod trace;
 
-pub use crown::{Cast, Crown, LeafOptics, Seen, Shape, TransferAt};
+pub use crown::{Cast, CrownModel, LeafOptics, Seen, TransferAt};
 pub use field::{FieldAim, FieldCrown};
 pub use store::{key, load_or_measure, path};
 
+use crate::physics::crown::Crown;
 use crate::physics::tables::ForestTables;
 use crate::progress::Progress;
 use crate::settings::Settings;
@@ -74,8 +75,8 @@ impl ForestSettings {
     }
 
     /// Trees per m² of the patches: the pattern's density, or what gives [`SPARSEST`].
-    fn measured_density(&self, shape: &Shape) -> f64 {
-        self.pattern_density.max(SPARSEST / mean_area(shape, self.scale_range))
+    fn measured_density(&self, crown: &Crown) -> f64 {
+        self.pattern_density.max(SPARSEST / mean_area(crown, self.scale_range))
     }
 }
 
@@ -95,9 +96,9 @@ impl Default for ForestSettings {
     }
 }
 
-/// Mean horizontal area of a species' trees, m²: A = π `crown_radius`² E(scale²).
-pub fn mean_area(shape: &Shape, scale_range: [f32; 2]) -> f64 {
-    std::f64::consts::PI * f64::from(shape.crown_radius).powi(2) * mean_squared_scale(scale_range)
+/// Mean horizontal area of a species' trees, m²: A = π `crown.radius`² E(scale²).
+pub fn mean_area(crown: &Crown, scale_range: [f32; 2]) -> f64 {
+    std::f64::consts::PI * f64::from(crown.radius).powi(2) * mean_squared_scale(scale_range)
 }
 
 /// E(scale²) of scales drawn evenly from a range: (a² + ab + b²) / 3.
@@ -131,7 +132,7 @@ fn check(forest: &ForestSettings) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Usage`] for settings out of range.
-pub fn measure<C: Crown>(crown: &C, forest: &ForestSettings, quiet: bool) -> Result<ForestTables> {
+pub fn measure<C: CrownModel>(crown: &C, forest: &ForestSettings, quiet: bool) -> Result<ForestTables> {
     check(forest)?;
     let progress =
         Progress::new("measuring forest", u64::from(forest.angles) * u64::from(forest.angles), quiet);
@@ -140,5 +141,5 @@ pub fn measure<C: Crown>(crown: &C, forest: &ForestSettings, quiet: bool) -> Res
         _ => measure::measure::<C, MOST_DENSITIES>(crown, forest, &progress),
     };
     progress.finish();
-    Ok(finish::tables(crown.shape(), forest, &measured))
+    Ok(finish::tables((crown.crown(), crown.leaf()), forest, &measured))
 }

@@ -1,8 +1,8 @@
 //! Patches of forest to measure: tori of Wang tiles, or of Poisson points.
 
 use super::ForestSettings;
-use super::crown::Shape;
 use crate::land::pattern::Pattern;
+use crate::physics::crown::Crown;
 use crate::physics::hash::{Stream, hash2};
 
 /// Steps of a turn: azimuths of rays relative to trees are rounded to these. A step moves the edge of a crown of 5 m by
@@ -69,10 +69,10 @@ fn floor(x: f32) -> i32 {
 }
 
 /// The patches of a forest, each an independent tiling.
-pub fn patches(shape: &Shape, forest: &ForestSettings, count: usize) -> Vec<Patch> {
+pub fn patches(crown: &Crown, forest: &ForestSettings, count: usize) -> Vec<Patch> {
     let pattern = Pattern::new(TILE_POINTS, SEED);
-    let tile = (pattern.mean_points() / forest.measured_density(shape)).sqrt();
-    let reach = shape.radius.max(shape.crown_radius) * forest.scale_range[1];
+    let tile = (pattern.mean_points() / forest.measured_density(crown)).sqrt();
+    let reach = crown.frame.half_width.max(crown.radius) * forest.scale_range[1];
     (0..count as u32)
         .map(|k| {
             let mut stream = Stream::new(hash2(SEED, k));
@@ -187,6 +187,7 @@ impl Patch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::physics::crown::Frame;
 
     fn forest(poisson: bool) -> ForestSettings {
         ForestSettings {
@@ -197,22 +198,19 @@ mod tests {
         }
     }
 
-    const SHAPE: Shape = Shape {
-        center: 5.0,
-        radius: 4.0,
-        half_height: 5.0,
-        crown_radius: 3.0,
-        crown_base: 2.0,
+    const CROWN: Crown = Crown {
+        frame: Frame { centre: 5.0, half_width: 4.0, half_height: 5.0 },
+        radius: 3.0,
+        base: 2.0,
         height: 10.0,
         leaf_shadow: 0.0,
-        leaf: crate::bake::tables::LeafOptics { scattered: [0.1, 0.05], turning: 0.0, albedo: 0.15 },
         extinction: 1.0,
     };
 
     #[test]
     fn patches_have_the_density_of_the_pattern() {
         for poisson in [false, true] {
-            let patches = patches(&SHAPE, &forest(poisson), 16);
+            let patches = patches(&CROWN, &forest(poisson), 16);
             let trees: usize = patches.iter().map(|p| p.trees.len()).sum();
             let area: f64 = patches.iter().map(|p| f64::from(p.side).powi(2)).sum();
             let ratio = trees as f64 / area / 0.03;
@@ -223,7 +221,7 @@ mod tests {
 
     #[test]
     fn tiles_keep_their_distance_across_the_torus() {
-        let patch = &patches(&SHAPE, &forest(false), 1)[0];
+        let patch = &patches(&CROWN, &forest(false), 1)[0];
         let least = Pattern::new(TILE_POINTS, SEED).distance as f32 * patch.side / TILES as f32;
         for a in &patch.trees {
             let nearest = patch.trees.iter().filter(|b| b.index != a.index).map(|b| {
@@ -240,7 +238,7 @@ mod tests {
     /// Every tree near a segment is met once an image, against all images within three tori.
     #[test]
     fn segments_meet_every_tree_near_them() {
-        let patch = &patches(&SHAPE, &forest(true), 1)[0];
+        let patch = &patches(&CROWN, &forest(true), 1)[0];
         let mut stream = Stream::new(5);
         for k in 0..200 {
             let angle = stream.unit() as f32 * std::f32::consts::TAU;

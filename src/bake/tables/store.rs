@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use super::crown::Shape;
+use super::crown::LeafOptics;
 use super::field::FieldCrown;
 use super::{ForestSettings, RESOLUTION, check, measure};
 use crate::Result;
 use crate::bake::file::{Fields, Format, load_or_build};
 use crate::bake::{CacheState, SpeciesBake};
+use crate::physics::crown::{Crown, Frame};
 use crate::physics::tables::ForestTables;
 
 const FORMAT: Format = Format { magic: *b"CANOPYFT", version: 5, extension: "forest" };
@@ -68,19 +69,17 @@ pub fn key(bake: &SpeciesBake, forest: &ForestSettings) -> [u8; 32] {
     }
     fields.put(&pattern_density.to_le_bytes());
     fields.put(&little(&[scale_range[0], scale_range[1], hole_radius]));
-    let Shape {
-        center,
+    let Crown {
+        frame: Frame { centre, half_width, half_height },
         radius,
-        half_height,
-        crown_radius,
-        crown_base,
+        base,
         height,
         leaf_shadow,
         extinction,
-        leaf,
-    } = Shape::of(bake);
-    let shape = [center, radius, half_height, crown_radius, crown_base, height, leaf_shadow, extinction];
-    fields.put(&little(&shape));
+    } = bake.crown;
+    let crown = [centre, half_width, half_height, radius, base, height, leaf_shadow, extinction];
+    fields.put(&little(&crown));
+    let leaf = LeafOptics::of(bake);
     fields.put(&little(&[leaf.scattered[0], leaf.scattered[1], leaf.turning, leaf.albedo]));
     fields.put(&bake.views.n.to_le_bytes());
     fields.put(&bake.views.resolution.to_le_bytes());

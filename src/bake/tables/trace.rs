@@ -6,7 +6,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::crown::{Crown, TransferAt};
+use super::crown::{CrownModel, TransferAt};
 use super::patch::{Patch, Segment, TURNS, Tree};
 use crate::physics::tables::unscaled_zenith;
 
@@ -25,7 +25,7 @@ pub struct Heading<A> {
 
 impl<A> Heading<A> {
     /// Rays at a zenith angle θ < 90°, rad, in the space scaled vertically by `vertical_scale`.
-    pub fn new<C: Crown<Aim = A>>(crown: &C, theta: f64, vertical_scale: f64) -> Self {
+    pub fn new<C: CrownModel<Aim = A>>(crown: &C, theta: f64, vertical_scale: f64) -> Self {
         let zenith = unscaled_zenith(theta, vertical_scale);
         let tree_zenith = Self::tree_zenith(crown, zenith);
         let aims =
@@ -34,18 +34,19 @@ impl<A> Heading<A> {
     }
 
     /// A single ray at a zenith angle in metres, rad, with the azimuth that trees see it from.
-    pub fn single<C: Crown<Aim = A>>(crown: &C, zenith: f64) -> Self {
+    pub fn single<C: CrownModel<Aim = A>>(crown: &C, zenith: f64) -> Self {
         Self::with(crown, zenith.min(FRAC_PI_2 - 0.01), Vec::new())
     }
 
-    fn tree_zenith<C: Crown<Aim = A>>(crown: &C, zenith: f64) -> f64 {
-        let shape = crown.shape();
-        (zenith.sin() / f64::from(shape.radius)).atan2(zenith.cos() / f64::from(shape.half_height))
+    fn tree_zenith<C: CrownModel<Aim = A>>(crown: &C, zenith: f64) -> f64 {
+        let frame = crown.crown().frame;
+        (zenith.sin() / f64::from(frame.half_width)).atan2(zenith.cos() / f64::from(frame.half_height))
     }
 
-    fn with<C: Crown<Aim = A>>(crown: &C, zenith: f64, aims: Vec<A>) -> Self {
-        let shape = crown.shape();
-        let (x, z) = (zenith.sin() / f64::from(shape.radius), zenith.cos() / f64::from(shape.half_height));
+    fn with<C: CrownModel<Aim = A>>(crown: &C, zenith: f64, aims: Vec<A>) -> Self {
+        let frame = crown.crown().frame;
+        let (x, z) =
+            (zenith.sin() / f64::from(frame.half_width), zenith.cos() / f64::from(frame.half_height));
         let (scaled_sine, scaled_cosine) = Self::tree_zenith(crown, zenith).sin_cos();
         Heading {
             sine: zenith.sin() as f32,
@@ -70,7 +71,7 @@ impl<A> Heading<A> {
     }
 
     /// Where a tree's ray (a, b) leaves the ground.
-    pub fn ground<C: Crown>(
+    pub fn ground<C: CrownModel>(
         &self,
         crown: &C,
         patch: &Patch,
@@ -78,17 +79,17 @@ impl<A> Heading<A> {
         azimuth: &Azimuth,
         (a, b): (f32, f32),
     ) -> [f32; 2] {
-        let shape = crown.shape();
+        let frame = crown.crown().frame;
         let [s, c] = self.scaled;
-        let metres = shape.radius * tree.scale;
-        let (along, across) = (-(b + s * shape.center / shape.half_height) * metres / c, a * metres);
+        let metres = frame.half_width * tree.scale;
+        let (along, across) = (-(b + s * frame.centre / frame.half_height) * metres / c, a * metres);
         let [ca, sa] = azimuth.along;
         let [x, y] = tree.position;
         [x + along * ca - across * sa, y + along * sa + across * ca].map(|v| v.rem_euclid(patch.side))
     }
 
     /// Light transfer of what a view ray along this heading has hit.
-    pub fn transfer<C: Crown<Aim = A>>(&self, crown: &C, hit: &Hit) -> TransferAt {
+    pub fn transfer<C: CrownModel<Aim = A>>(&self, crown: &C, hit: &Hit) -> TransferAt {
         crown.transfer(&self.aims[hit.step as usize], hit.at)
     }
 
@@ -137,7 +138,7 @@ struct Met {
 
 /// The ray's coordinates at a tree, `offset` being from the trunk to the origin at height `z`; `None` where it misses the box.
 #[inline]
-fn at_tree<C: Crown>(
+fn at_tree<C: CrownModel>(
     crown: &C,
     heading: &Heading<C::Aim>,
     azimuth: &Azimuth,
@@ -145,15 +146,15 @@ fn at_tree<C: Crown>(
     offset: [f32; 2],
     z: f32,
 ) -> Option<Met> {
-    let shape = crown.shape();
+    let frame = crown.crown().frame;
     let [ca, sa] = azimuth.along;
     let across = offset[1] * ca - offset[0] * sa;
-    if across.abs() >= shape.radius * tree.scale {
+    if across.abs() >= frame.half_width * tree.scale {
         return None;
     }
-    let inverse = 1.0 / (tree.scale * shape.radius);
+    let inverse = 1.0 / (tree.scale * frame.half_width);
     let horizontal = (offset[0] * ca + offset[1] * sa) * inverse;
-    let vertical = (z / tree.scale - shape.center) / shape.half_height;
+    let vertical = (z / tree.scale - frame.centre) / frame.half_height;
     let [s, c] = heading.scaled;
     let b = s * vertical - c * horizontal;
     (b.abs() < s + c).then(|| Met {
@@ -185,19 +186,20 @@ pub struct Hit {
 }
 
 /// Half the corridor's width, m.
-fn reach<C: Crown>(crown: &C, largest: f32) -> f32 {
-    crown.shape().radius * largest
+fn reach<C: CrownModel>(crown: &C, largest: f32) -> f32 {
+    crown.crown().frame.half_width * largest
 }
 
 /// Where a ray from height `z` has passed above every tree, m along the ground.
-fn length<C: Crown>(crown: &C, heading: &Heading<C::Aim>, z: f32, largest: f32) -> f32 {
-    let top = (crown.shape().center + crown.shape().half_height) * largest;
+fn length<C: CrownModel>(crown: &C, heading: &Heading<C::Aim>, z: f32, largest: f32) -> f32 {
+    let frame = crown.crown().frame;
+    let top = (frame.centre + frame.half_height) * largest;
     (top - z).max(0.0) * heading.sine / heading.cosine
 }
 
 /// The ray from a ground point to the viewer: `hits` from the viewer's end on, and `boxes`, the sum of 1/scale² of the trees
 /// whose boxes it passes.
-pub fn view<C: Crown>(
+pub fn view<C: CrownModel>(
     crown: &C,
     patch: &Patch,
     heading: &Heading<C::Aim>,
@@ -297,7 +299,7 @@ pub struct Light<const M: usize> {
 /// What a receiver's own tree leaves of the light at a phase angle, rad, over the metres s to where the ray enters it, and s
 /// ([`crate::physics::light::self_shadow`]; metres of the model, because what is in a crown grows with it).
 #[inline]
-pub fn own<C: Crown>(
+pub fn own<C: CrownModel>(
     crown: &C,
     patch: &Patch,
     heading: &Heading<C::Aim>,
@@ -315,15 +317,15 @@ pub fn own<C: Crown>(
         Some(((depth - met.depth) * met.metres).max(0.0))
     });
     let metres = metres.unwrap_or(0.0);
-    let shape = crown.shape();
-    let through = shape.leaf_shadow * angle.sqrt() + (shape.extinction / tree.scale * angle * metres).sqrt();
+    let shade = crown.crown();
+    let through = shade.leaf_shadow * angle.sqrt() + (shade.extinction / tree.scale * angle * metres).sqrt();
     ((-through).exp(), metres)
 }
 
 /// The ray of light to a receiver, past its own tree, which it enters after `entry` m: others shadow it if their back lies
 /// nearer the sun than that (`shaders/frame/trees/zfield_shade.glsl`).
 #[inline]
-pub fn light<C: Crown, const M: usize>(
+pub fn light<C: CrownModel, const M: usize>(
     crown: &C,
     patch: &Patch,
     heading: &Heading<C::Aim>,

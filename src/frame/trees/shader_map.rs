@@ -12,7 +12,7 @@ pub const NODE_TEXELS: (vk::Format, u64) = (vk::Format::R32G32B32A32_SFLOAT, 16)
 
 /// Nodes of every terrain quad in view, and what computes them.
 pub struct ShaderMap {
-    /// [`ForestNode`]s, 17 × 17 a quad, in the order of the camera's terrain quads.
+    /// [`crate::gpu::interface::ForestNode`]s, 17 × 17 a quad, in the order of the camera's terrain quads.
     pub nodes: Buffer,
     program: Program,
 }
@@ -29,11 +29,11 @@ impl ShaderMap {
             program: gpu.compute(
                 &shaders::FRAME_TREES_SHADER_MAP_COMP,
                 &[
-                    (0, plan.cover_channels),
-                    (2, forest.species.count),
-                    (3, float(forest.tables.angles)),
-                    (4, float(forest.tables.densities)),
-                    (5, u32::from(plan.pair_tables)),
+                    ("COVER_CHANNELS", plan.cover_channels),
+                    ("SPECIES_COUNT", forest.species.count),
+                    ("TABLE_ANGLES", float(forest.tables.angles)),
+                    ("TABLE_DENSITIES", float(forest.tables.densities)),
+                    ("PAIR_TABLES", u32::from(plan.pair_tables)),
                 ],
             )?,
         })

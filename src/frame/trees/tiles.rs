@@ -108,11 +108,16 @@ impl TreeTiles {
             scan: gpu.compute(&shaders::FRAME_TREES_TILES_SCAN_COMP, &[])?,
             sight: gpu.compute(
                 &shaders::FRAME_TREES_TILES_SIGHT_COMP,
-                &[(0, s.view_rings), (1, resolution), (2, mask_rows), (3, plan.samples)],
+                &[
+                    ("VIEW_RINGS", s.view_rings),
+                    ("VIEW_RESOLUTION", resolution),
+                    ("MASK_ROWS", mask_rows),
+                    ("SAMPLES", plan.samples),
+                ],
             )?,
             entries_count: gpu.compute(&shaders::FRAME_TREES_TILES_ENTRIES_COUNT_COMP, &[])?,
             entries_fill: gpu.compute(&shaders::FRAME_TREES_TILES_ENTRIES_FILL_COMP, &[])?,
-            see: gpu.compute(see, &[(0, plan.samples), (1, before)])?,
+            see: gpu.compute(see, &[("SAMPLES", plan.samples), ("ESTIMATES", before)])?,
             shade: gpu.compute(
                 if plan.layers {
                     &shaders::FRAME_TREES_TILES_SHADE_LAYERS_COMP
@@ -120,13 +125,13 @@ impl TreeTiles {
                     &shaders::FRAME_TREES_TILES_SHADE_COMP
                 },
                 &[
-                    (0, plan.samples),
-                    (1, before),
+                    ("SAMPLES", plan.samples),
+                    ("ESTIMATES", before),
                     // Without sun no ray goes to it.
-                    (2, if plan.cascades > 0 { s.light_iterations } else { 0 }),
-                    (3, u32::from(plan.cascades > 0)),
-                    (4, plan.transfer_bands),
-                    (12, plan.view_mode as u32),
+                    ("LIGHT_ITERATIONS", if plan.cascades > 0 { s.light_iterations } else { 0 }),
+                    ("HAS_SUN", u32::from(plan.cascades > 0)),
+                    ("TRANSFER_BANDS", plan.transfer_bands),
+                    ("VIEW_MODE", plan.view_mode as u32),
                 ],
             )?,
         })

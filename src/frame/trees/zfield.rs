@@ -28,6 +28,22 @@ impl Trees {
         let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
         let before = s.view_iterations - 1;
         let program = |estimates: u32, magnified: bool, converged: bool| {
+            let mut constants = vec![
+                ("VIEW_RINGS", s.view_rings),
+                ("VIEW_RESOLUTION", (s.view_resolution as f32).to_bits()),
+                ("MASK_ROWS", mask_rows),
+                ("SAMPLES", plan.samples),
+                ("ESTIMATES", estimates),
+                // Without sun no ray goes to it.
+                ("LIGHT_ITERATIONS", if plan.cascades > 0 { s.light_iterations } else { 0 }),
+                ("HAS_SUN", u32::from(plan.cascades > 0)),
+                ("MAGNIFIED", u32::from(magnified)),
+                ("CONVERGED", u32::from(converged)),
+                ("TRANSFER_BANDS", plan.transfer_bands),
+            ];
+            if plan.view_mode != ViewMode::Radiance {
+                constants.push(("VIEW_MODE", plan.view_mode as u32));
+            }
             gpu.graphics(&GraphicsDesc {
                 vert: &shaders::FRAME_TREES_ZFIELD_VERT,
                 frag: match plan.view_mode {
@@ -38,20 +54,7 @@ impl Trees {
                 colors: &formats,
                 samples: plan.samples,
                 depth: DepthTest::Reverse,
-                constants: &[
-                    (0, s.view_rings),
-                    (1, (s.view_resolution as f32).to_bits()),
-                    (2, mask_rows),
-                    (3, plan.samples),
-                    (4, estimates),
-                    // Without sun no ray goes to it.
-                    (5, if plan.cascades > 0 { s.light_iterations } else { 0 }),
-                    (6, u32::from(plan.cascades > 0)),
-                    (7, u32::from(magnified)),
-                    (8, u32::from(converged)),
-                    (9, plan.transfer_bands),
-                    (12, plan.view_mode as u32),
-                ],
+                constants: &constants,
             })
         };
         Ok(Trees {

@@ -78,7 +78,7 @@ impl Target {
                 colors: &[format],
                 samples,
                 depth: DepthTest::None,
-                constants: &[(2, table.len() as u32), (3, samples)],
+                constants: &[("MASK_ROWS", table.len() as u32), ("SAMPLES", samples)],
             })?,
         })
     }

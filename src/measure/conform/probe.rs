@@ -41,7 +41,7 @@ pub enum Function {
 /// [`crate::Error::Device`].
 pub fn evaluate(gpu: &Gpu, function: Function, arguments: &[Arguments]) -> Result<Vec<Words>> {
     let inputs = gpu.buffer_with("probe inputs", arguments)?;
-    let (shader, constants) = (&shaders::PROBE_PHYSICS_COMP, [(0, function as u32)]);
+    let (shader, constants) = (&shaders::PROBE_PHYSICS_COMP, [("FUNCTION", function as u32)]);
     dispatch(gpu, shader, &constants, &[("inputs", Resource::Buffer(&inputs))], arguments.len(), &[])
 }
 
@@ -52,7 +52,7 @@ pub fn evaluate(gpu: &Gpu, function: Function, arguments: &[Arguments]) -> Resul
 pub fn dispatch<T: Pod>(
     gpu: &Gpu,
     shader: &'static Shader,
-    constants: &[(u32, u32)],
+    constants: &[(&str, u32)],
     resources: &[(&str, Resource)],
     count: usize,
     more: &[u32],
@@ -242,15 +242,15 @@ fn light_transfer(gpu: &Gpu) -> Result<Finding> {
         let bands = [transfer::decode(bytes(0)), transfer::decode(bytes(4))];
         // A coefficient is a difference of 8 and 4 at most, 12 roundings of 1; eight of them times terms of at most 1, and
         // seven sums of at most 32.
-        // The reach's exponential has 4 ulp of 1, times 16 that coefficients make at most.
+        // The strength's exponential has 4 ulp of 1, times 16 that coefficients make at most.
         let error = (8.0 * 12.0 + 7.0 * 32.0 + 16.0 * 12.0) * EPS;
-        vec![(transfer::transfer(&bands, [x[8], x[9], x[10]], transfer::reach(x[11])), error)]
+        vec![(transfer::transfer(&bands, [x[8], x[9], x[10]], transfer::strength(x[11])), error)]
     })
 }
 
 fn hand_over(gpu: &Gpu) -> Result<Finding> {
-    let reaches = (0..=120).map(|k| k as f32 / 100.0);
-    let inputs: Vec<Vec<f32>> = reaches
+    let relative = (0..=120).map(|k| k as f32 / 100.0);
+    let inputs: Vec<Vec<f32>> = relative
         .flat_map(|r| [0.0f32, 0.4, 0.9].map(|x| vec![r, 0.45, x, 0.0, 3.0 * r, x, 1.0 - x, 0.5 + 0.4 * x]))
         .collect();
     compare(gpu, Function::Handover, &inputs, |x| {

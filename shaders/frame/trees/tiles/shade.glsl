@@ -85,9 +85,9 @@ Shown shade(uint rank, vec2 offset, out float depth) {
     // A texel spans crowns whose backs slope by about one: half a texel towards the sun, or neighbours shade each other's rims.
     ray.entry.z += 0.5 * v.cascade_texel[cascade] * ray.deeper;
     float phase_angle = angle_between(-t.centre, v.sun_direction), root = sqrt(phase_angle);
-    TreeLight light = TreeLight(t.sun, t.sky, t.mean_sun, t.mean_sky, t.mean_lit, t.own, kind.bark, kind.crown_base,
+    TreeLight light = TreeLight(t.sun, t.sky, t.mean_sun, t.mean_sky, t.mean_lit, t.own, kind.bark_ratio, kind.bare_below,
                                 plane.half_extent.z, t.hole, kind.leaf_shadow * root, kind.extinction * phase_angle / t.scale, toward,
-                                transfer_reach(root), t.cascade);
+                                transfer_strength(root), t.cascade);
     TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, light, surface, at, to, layers, below, t.mip, magnified,
                                  s, found.z, ray, LightQuality(HAS_SUN, LIGHT_ITERATIONS, TRANSFER_BANDS));
 #ifdef LAYERS

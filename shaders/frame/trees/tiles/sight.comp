@@ -25,8 +25,8 @@ layout(std430, binding = 11) writeonly buffer Boxes { uvec2 items[]; } boxes;
 layout(std430, binding = 12) writeonly buffer Spans { uint items[]; } spans;
 layout(std430, binding = 13) writeonly buffer Ranked { uint items[]; } ranked; // tree | draw << 30
 layout(push_constant) uniform Push { TileParameters p; };
-layout(constant_id = 0) const int RINGS = 9;
-layout(constant_id = 1) const float RESOLUTION = 256.0;
+layout(constant_id = 0) const int VIEW_RINGS = 9;
+layout(constant_id = 1) const float VIEW_RESOLUTION = 256.0;
 layout(constant_id = 2) const uint MASK_ROWS = 12u;
 layout(constant_id = 3) const uint SAMPLES = 4u;
 
@@ -56,7 +56,8 @@ void main() {
     vec3 layers = unpack_layers(t.view_layers, kind.first_layer);
     ViewBasis around[3];
     for (int k = 0; k < 3; k++) around[k] = fetch_basis(bases, uint(layers[k]));
-    plane.extent = quad_extent(plane, t.mip, around[0].bounds, around[1].bounds, around[2].bounds, t.view_layers >> 31u != 0u, RINGS, RESOLUTION);
+    plane.extent = quad_extent(plane, t.mip, around[0].bounds, around[1].bounds, around[2].bounds,
+                               t.view_layers >> 31u != 0u, VIEW_RINGS, VIEW_RESOLUTION);
     Camera camera = camera_of(v, vec2(p.size));
 
     Sight s;
