@@ -24,6 +24,7 @@ layout(location = 24) flat in vec4 mean_sun;
 layout(location = 25) flat in vec4 mean_sky;
 layout(location = 26) flat in vec4 sun_from; // in the tree's own axes; w: reach of light transfer
 
+layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 6) uniform sampler2DArray views;
 layout(binding = 7) uniform sampler2DArray shadow_map;
 layout(binding = 8) uniform sampler2DArray transfer_1;
@@ -89,9 +90,9 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
         float through = self_shadow(own.y, optics.y, metres);
         vec3 entry = mix(shadow_p, shadow_c.xyz, s);
         entry.z += metres * shadow_c.w;
-        uint cascade = tree_bits.w & 15u;
-        float visible = sun_visibility(shadow_map, entry, vec2(0.0), min(cascade, 3u));
-        through *= cascade < 4u ? visible : 1.0;
+        uint cascade = tree_bits.w & 15u, layer = min(cascade, MAX_CASCADES - 1u);
+        float visible = sun_visibility(shadow_map, entry, vec2(0.0), view.v.cascade_turn[layer].xy, layer);
+        through *= cascade < MAX_CASCADES ? visible : 1.0;
         float reached = through;
         // From below, views show the other side.
         if (TRANSFER_BANDS > 0u && !below) {

@@ -3,6 +3,7 @@
 
 pub mod cache;
 pub mod candidate;
+pub mod casters;
 pub mod coverage;
 pub mod cull;
 pub mod density;

@@ -3,7 +3,10 @@
 pub mod camera;
 pub mod cascades;
 pub mod ground;
+pub mod pages;
+pub mod receivers;
 pub mod shader_map;
+pub mod shadow_ground;
 pub mod shadows;
 pub mod sky;
 pub mod targets;
@@ -17,9 +20,11 @@ use tracing::info_span;
 
 use crate::bake::Baked;
 use crate::clock::{monotonic_ns, process_cpu_ms_since, process_cpu_ns};
-use crate::forest::coverage::CoverageData;
+use crate::forest::casters::{CasterData, CasterWork};
+use crate::forest::coverage::{CoverageData, CoverageWork};
 use crate::forest::cull::{CullData, TreeCounts};
-use crate::forest::seeds::SeedData;
+use crate::forest::quadtree::Quadtree;
+use crate::forest::seeds::{FreshSeeds, SeedData, SeedWork};
 use crate::forest::species::SpeciesData;
 use crate::forest::tables::TableData;
 use crate::forest::terrain::TerrainData;
@@ -33,7 +38,7 @@ use camera::Eye;
 use cascades::Cascade;
 use ground::Ground;
 use shader_map::ShaderMap;
-use shadows::Shadows;
+use shadows::{CastingTrees, ShadowWork, Shadows};
 use sky::SkyPass;
 use targets::ImageTargets;
 use tonemap::Tonemap;
@@ -54,10 +59,57 @@ pub struct Forest {
     pub near: Option<NearTrees>,
 }
 
+/// What a frame has to make of a forest.
+struct ForestWork {
+    seeds: SeedWork,
+    coverage: CoverageWork,
+    casters: CasterWork,
+}
+
+impl ForestWork {
+    /// Number of seed quads produced.
+    fn fresh_quads(&self) -> u32 {
+        self.seeds.fresh.1 + self.casters.batches.iter().map(|b| b.fresh.1).sum::<u32>()
+    }
+}
+
+impl Forest {
+    /// Finds what casts into the shadow maps.
+    fn casting(
+        &mut self,
+        gpu: &Gpu,
+        tree: &Quadtree,
+        cascades: &[Cascade],
+        shadows: &ShadowWork,
+    ) -> Result<CasterWork> {
+        match self.near.as_mut().and_then(|n| n.casters.as_mut()) {
+            Some(casters) if !shadows.blocks.is_empty() => {
+                casters.plan(gpu, &mut self.seeds, tree, cascades, &shadows.blocks)
+            }
+            _ => Ok(CasterWork::default()),
+        }
+    }
+
+    /// The seeds to produce before anything is drawn: those that the camera sees, and of the first batch of casters.
+    fn fresh(&self, work: &ForestWork) -> Vec<FreshSeeds<'_>> {
+        let casters = self.near.as_ref().and_then(|n| n.casters.as_ref()).zip(work.casters.batches.first());
+        std::iter::once((&self.seeds.quads, work.seeds.fresh))
+            .chain(casters.map(|(data, batch)| data.fresh(batch)))
+            .collect()
+    }
+
+    fn casting_trees<'a>(&'a self, work: &'a ForestWork) -> Option<CastingTrees<'a>> {
+        let data = self.near.as_ref()?.casters.as_ref()?;
+        Some(CastingTrees { data, work: &work.casters, seeds: &self.seeds, species: &self.species })
+    }
+}
+
 /// Trees drawn one by one.
 pub struct NearTrees {
     /// Culling.
     pub cull: CullData,
+    /// What finds the trees that cast shadows, where there is a sun.
+    pub casters: Option<CasterData>,
     pass: Trees,
 }
 
@@ -129,6 +181,7 @@ impl Renderer {
             let near = || -> Result<NearTrees> {
                 Ok(NearTrees {
                     cull: CullData::new(gpu, &scene, &plan, &tables)?,
+                    casters: (plan.cascades > 0).then(|| CasterData::new(gpu, &scene, &plan)).transpose()?,
                     pass: Trees::new(gpu, &scene, &plan, species.mask_rows)?,
                 })
             };
@@ -217,6 +270,18 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::render`].
     pub fn draw(&mut self, eye: &Eye, cascades: &[Cascade], exposure: f64) -> Result<(FrameReport, View)> {
+        let drawn = self.draw_kept(eye, cascades, exposure);
+        if drawn.is_err() {
+            self.shadows.forget();
+            if let Some(forest) = &mut self.forest {
+                forest.seeds.forget();
+            }
+        }
+        drawn
+    }
+
+    /// Draws a frame that takes what the ones before left to be drawn.
+    fn draw_kept(&mut self, eye: &Eye, cascades: &[Cascade], exposure: f64) -> Result<(FrameReport, View)> {
         let _frame = info_span!("frame").entered();
         let (start_ns, cpu) = (monotonic_ns(), process_cpu_ns());
         let evicted = self.evicted();
@@ -229,18 +294,18 @@ impl Renderer {
                 plan.last_range()
             )));
         }
-        let sun = self.light.direction;
-        let [lowest, highest] = heights;
-
         // Stream: which quads, where in the caches, what is new.
         let streaming = info_span!("stream").entered();
         let pixels = f64::from(scene.settings.terrain_pixels);
-        let mut draws = self.terrain.update(eye, cascades, pixels)?;
+        let mut draws = self.terrain.update(eye, cascades.last().map_or(-1.0, |c| c.far), pixels)?;
+        let tree = &self.terrain.tree;
+        let shadows = self.shadows.update(gpu, (scene, plan), tree, eye, cascades)?;
         let mut work = None;
         if let Some(forest) = &mut self.forest {
-            let reach = shadow_reach(sun, plan.cascades, plan.tallest + 0.25 * (highest - lowest));
-            let fresh = forest.seeds.update(gpu, scene, plan, &self.terrain.tree, eye, reach)?;
-            work = Some((fresh, forest.coverage.update(gpu, &self.terrain.tree, &forest.seeds, &mut draws)?));
+            let seeds = forest.seeds.update(gpu, scene, plan, tree, eye)?;
+            let coverage = forest.coverage.update(gpu, tree, &forest.seeds, &mut draws)?;
+            work =
+                Some(ForestWork { seeds, coverage, casters: forest.casting(gpu, tree, cascades, &shadows)? });
         }
         self.terrain.upload(gpu, &draws)?;
         let seeds = self.forest.as_ref().map(|f| &f.seeds);
@@ -254,9 +319,9 @@ impl Renderer {
         let mut recorder = gpu.record()?;
         recorder.stage("stream", |r| {
             self.terrain.produce(r, &draws);
-            if let (Some(forest), Some((fresh, tiles))) = (&self.forest, &work) {
-                forest.seeds.produce(r, fresh, &self.terrain, &forest.species);
-                forest.coverage.produce(r, tiles, &forest.seeds, &self.terrain, &forest.species);
+            if let (Some(forest), Some(work)) = (&self.forest, &work) {
+                forest.seeds.produce(r, &forest.fresh(work), &self.terrain, &forest.species);
+                forest.coverage.produce(r, &work.coverage, &forest.seeds, &self.terrain, &forest.species);
             }
         });
         if let Some(Forest { seeds, species, tables, near: Some(NearTrees { cull, .. }), .. }) = &self.forest
@@ -265,9 +330,9 @@ impl Renderer {
                 cull.record(r, &self.view, seeds, species, tables, &self.terrain);
             });
         }
-        let trees = self.forest.as_ref().and_then(|f| Some((&f.near.as_ref()?.cull, &f.seeds, &f.species)));
+        let casting = self.forest.as_ref().zip(work.as_ref()).and_then(|(f, w)| f.casting_trees(w));
+        self.shadows.record(&mut recorder, &self.view, &self.terrain, &shadows, casting);
         let ground = (&self.terrain, &draws);
-        self.shadows.record(&mut recorder, &self.view, &self.ground.indices, ground, trees);
         recorder.stage("image", |r| {
             if let Some(sky) = &self.sky {
                 sky.record(r, &self.view, &self.targets);
@@ -290,12 +355,7 @@ impl Renderer {
         let ms = |from: u64, to: u64| to.saturating_sub(from) as f64 * 1e-6;
         let after = self.evicted();
 
-        let trees = match &self.forest {
-            Some(Forest { seeds, near: Some(near), .. }) if seeds.visible > 0 => {
-                near.cull.counts(gpu, cascades.len())?
-            }
-            _ => TreeCounts::default(),
-        };
+        let trees = self.count_trees(cascades.len(), work.as_ref(), &shadows)?;
         let report = FrameReport {
             start_ns,
             stream_ms: ms(start_ns, record_ns),
@@ -303,8 +363,8 @@ impl Renderer {
             cpu_ms,
             produced: Tiles {
                 terrain: draws.fresh.1,
-                seeds: work.as_ref().map_or(0, |(seeds, _)| seeds.fresh.1),
-                coverage: work.as_ref().map_or(0, |(_, coverage)| coverage.tiles),
+                seeds: work.as_ref().map_or(0, ForestWork::fresh_quads),
+                coverage: work.as_ref().map_or(0, |w| w.coverage.tiles),
             },
             // A cache that is made anew begins to count again.
             evicted: Tiles {
@@ -318,6 +378,27 @@ impl Renderer {
             seed_quads: self.forest.as_ref().map_or(0, |f| f.seeds.visible),
         };
         Ok((report, view))
+    }
+
+    /// Reads how many trees a frame drew.
+    fn count_trees(
+        &self,
+        cascades: usize,
+        work: Option<&ForestWork>,
+        shadows: &ShadowWork,
+    ) -> Result<TreeCounts> {
+        let mut counts = TreeCounts::default();
+        let Some(Forest { seeds, near: Some(near), .. }) = &self.forest else { return Ok(counts) };
+        if seeds.visible > 0 {
+            counts.camera = near.cull.count(&self.gpu)?;
+        }
+        counts.cascades = vec![0; cascades];
+        if let Some((casters, work)) = near.casters.as_ref().zip(work) {
+            for (block, count) in shadows.blocks.iter().zip(casters.counts(&self.gpu, &work.casters)?) {
+                counts.cascades[block.cascade] += count;
+            }
+        }
+        Ok(counts)
     }
 
     /// Tiles thrown out so far.
@@ -343,15 +424,6 @@ impl Renderer {
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
     }
-}
-
-/// How far, and which way, a shadow of something `tall` reaches on level ground; at most twenty times its height.
-fn shadow_reach(sun: [f64; 3], cascades: u32, tall: f64) -> [f64; 3] {
-    if cascades == 0 {
-        return [0.0; 3];
-    }
-    let length = tall / sun[2].max(0.05);
-    [-sun[0] * length, -sun[1] * length, -sun[2] * length]
 }
 
 /// The exposure at which a level forest floor of 6 % reflectance, under this sun and sky, is drawn at a seventh of the
