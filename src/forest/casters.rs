@@ -38,6 +38,8 @@ pub struct CasterData {
     pub casters: Buffer,
     /// Draw commands: one a block, batch after batch.
     pub commands: Buffer,
+    /// What this frame finds and draws.
+    pub work: CasterWork,
     quads: Buffer,
     seed_quads: Buffer,
     program: Program,
@@ -93,6 +95,7 @@ impl CasterData {
         Ok(CasterData {
             casters: gpu.buffer("casters", u64::from(plan.caster_capacity) * size_of::<Caster>() as u64)?,
             commands: gpu.buffer("caster draws", 64 * size_of::<DrawCommand>() as u64)?,
+            work: CasterWork::default(),
             quads: gpu.buffer("caster quads", 4096 * size_of::<CasterQuad>() as u64)?,
             seed_quads: gpu.buffer("caster seed quads", 1024 * size_of::<SeedQuad>() as u64)?,
             program: gpu.compute(&shaders::FOREST_CASTERS_COMP, &constants)?,
@@ -104,14 +107,18 @@ impl CasterData {
     ///
     /// # Errors
     /// [`Error::Usage`] when the camera leaves no region to any of them; [`Error::Device`].
-    pub fn plan(
+    pub fn update(
         &mut self,
         gpu: &Gpu,
         seeds: &mut SeedData,
         tree: &Quadtree,
         cascades: &[Cascade],
         blocks: &[DrawnBlock],
-    ) -> Result<CasterWork> {
+    ) -> Result<()> {
+        self.work = CasterWork::default();
+        if blocks.is_empty() {
+            return Ok(());
+        }
         let mut work = CasterWork { blocks: blocks.len(), ..CasterWork::default() };
         let (mut fresh, mut filling) = (Vec::new(), Filling::default());
         for ((y, x), into) in casting_quads(seeds, tree, cascades, blocks) {
@@ -120,7 +127,7 @@ impl CasterData {
             if filling.records + records <= self.capacity {
                 claimed = seeds.claim((x, y));
             }
-            if claimed.is_none() {
+            if claimed.is_none() && records <= self.capacity {
                 filling.close(&mut work, &mut fresh);
                 seeds.release();
                 claimed = seeds.claim((x, y));
@@ -147,7 +154,13 @@ impl CasterData {
         gpu.renew(&mut self.quads, "caster quads", &work.quads)?;
         gpu.renew(&mut self.seed_quads, "caster seed quads", &fresh)?;
         gpu.renew(&mut self.commands, "caster draws", &draw_commands(&work))?;
-        Ok(work)
+        self.work = work;
+        Ok(())
+    }
+
+    /// Number of quads whose seeds are to be produced.
+    pub fn fresh_quads(&self) -> u32 {
+        self.work.batches.iter().map(|b| b.fresh.1).sum()
     }
 
     /// Quads whose seeds a batch wants produced.
@@ -164,9 +177,9 @@ impl CasterData {
         (blocks, sums): (&Buffer, &Buffer),
         seeds: &SeedData,
         species: &SpeciesData,
-        work: &CasterWork,
         batch: usize,
     ) {
+        let work = &self.work;
         recorder.compute("casters", |pass| {
             let Some(b) = work.batches.get(batch) else { return };
             pass.bind(
@@ -198,7 +211,8 @@ impl CasterData {
     ///
     /// # Errors
     /// [`Error::Device`] if the device fails.
-    pub fn counts(&self, gpu: &Gpu, work: &CasterWork) -> Result<Vec<u32>> {
+    pub fn counts(&self, gpu: &Gpu) -> Result<Vec<u32>> {
+        let work = &self.work;
         let commands: Vec<DrawCommand> = gpu.read(&self.commands, 0, work.batches.len() * work.blocks)?;
         let mut counts = vec![0; work.blocks];
         for (k, command) in commands.iter().enumerate() {

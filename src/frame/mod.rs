@@ -20,10 +20,9 @@ use tracing::info_span;
 
 use crate::bake::Baked;
 use crate::clock::{monotonic_ns, process_cpu_ms_since, process_cpu_ns};
-use crate::forest::casters::{CasterData, CasterWork};
-use crate::forest::coverage::{CoverageData, CoverageWork};
+use crate::forest::casters::CasterData;
+use crate::forest::coverage::CoverageData;
 use crate::forest::cull::{CullData, TreeCounts};
-use crate::forest::quadtree::Quadtree;
 use crate::forest::seeds::{FreshSeeds, SeedData, SeedWork};
 use crate::forest::species::SpeciesData;
 use crate::forest::tables::TableData;
@@ -38,7 +37,7 @@ use camera::Eye;
 use cascades::Cascade;
 use ground::Ground;
 use shader_map::ShaderMap;
-use shadows::{CastingTrees, ShadowWork, Shadows};
+use shadows::{CastingTrees, Shadows};
 use sky::SkyPass;
 use targets::ImageTargets;
 use tonemap::Tonemap;
@@ -59,48 +58,18 @@ pub struct Forest {
     pub near: Option<NearTrees>,
 }
 
-/// What a frame has to make of a forest.
-struct ForestWork {
-    seeds: SeedWork,
-    coverage: CoverageWork,
-    casters: CasterWork,
-}
-
-impl ForestWork {
-    /// Number of seed quads produced.
-    fn fresh_quads(&self) -> u32 {
-        self.seeds.fresh.1 + self.casters.batches.iter().map(|b| b.fresh.1).sum::<u32>()
-    }
-}
-
 impl Forest {
-    /// Finds what casts into the shadow maps.
-    fn casting(
-        &mut self,
-        gpu: &Gpu,
-        tree: &Quadtree,
-        cascades: &[Cascade],
-        shadows: &ShadowWork,
-    ) -> Result<CasterWork> {
-        match self.near.as_mut().and_then(|n| n.casters.as_mut()) {
-            Some(casters) if !shadows.blocks.is_empty() => {
-                casters.plan(gpu, &mut self.seeds, tree, cascades, &shadows.blocks)
-            }
-            _ => Ok(CasterWork::default()),
-        }
-    }
-
     /// The seeds to produce before anything is drawn: those that the camera sees, and of the first batch of casters.
-    fn fresh(&self, work: &ForestWork) -> Vec<FreshSeeds<'_>> {
-        let casters = self.near.as_ref().and_then(|n| n.casters.as_ref()).zip(work.casters.batches.first());
-        std::iter::once((&self.seeds.quads, work.seeds.fresh))
-            .chain(casters.map(|(data, batch)| data.fresh(batch)))
-            .collect()
+    fn fresh(&self, seen: &SeedWork) -> Vec<FreshSeeds<'_>> {
+        let casters = self.near.as_ref().and_then(|n| n.casters.as_ref());
+        let batch = casters.and_then(|c| c.work.batches.first().map(|b| c.fresh(b)));
+        std::iter::once((&self.seeds.quads, seen.fresh)).chain(batch).collect()
     }
 
-    fn casting_trees<'a>(&'a self, work: &'a ForestWork) -> Option<CastingTrees<'a>> {
+    /// What draws the trees that cast.
+    fn casting(&self) -> Option<CastingTrees<'_>> {
         let data = self.near.as_ref()?.casters.as_ref()?;
-        Some(CastingTrees { data, work: &work.casters, seeds: &self.seeds, species: &self.species })
+        Some(CastingTrees { data, seeds: &self.seeds, species: &self.species })
     }
 }
 
@@ -299,13 +268,15 @@ impl Renderer {
         let pixels = f64::from(scene.settings.terrain_pixels);
         let mut draws = self.terrain.update(eye, cascades.last().map_or(-1.0, |c| c.far), pixels)?;
         let tree = &self.terrain.tree;
-        let shadows = self.shadows.update(gpu, (scene, plan), tree, eye, cascades)?;
+        self.shadows.update(gpu, (scene, plan), tree, eye, cascades)?;
         let mut work = None;
         if let Some(forest) = &mut self.forest {
             let seeds = forest.seeds.update(gpu, scene, plan, tree, eye)?;
             let coverage = forest.coverage.update(gpu, tree, &forest.seeds, &mut draws)?;
-            work =
-                Some(ForestWork { seeds, coverage, casters: forest.casting(gpu, tree, cascades, &shadows)? });
+            if let Some(casters) = forest.near.as_mut().and_then(|n| n.casters.as_mut()) {
+                casters.update(gpu, &mut forest.seeds, tree, cascades, &self.shadows.work.blocks)?;
+            }
+            work = Some((seeds, coverage));
         }
         self.terrain.upload(gpu, &draws)?;
         let seeds = self.forest.as_ref().map(|f| &f.seeds);
@@ -319,9 +290,9 @@ impl Renderer {
         let mut recorder = gpu.record()?;
         recorder.stage("stream", |r| {
             self.terrain.produce(r, &draws);
-            if let (Some(forest), Some(work)) = (&self.forest, &work) {
-                forest.seeds.produce(r, &forest.fresh(work), &self.terrain, &forest.species);
-                forest.coverage.produce(r, &work.coverage, &forest.seeds, &self.terrain, &forest.species);
+            if let (Some(forest), Some((seeds, tiles))) = (&self.forest, &work) {
+                forest.seeds.produce(r, &forest.fresh(seeds), &self.terrain, &forest.species);
+                forest.coverage.produce(r, tiles, &forest.seeds, &self.terrain, &forest.species);
             }
         });
         if let Some(Forest { seeds, species, tables, near: Some(NearTrees { cull, .. }), .. }) = &self.forest
@@ -330,8 +301,8 @@ impl Renderer {
                 cull.record(r, &self.view, seeds, species, tables, &self.terrain);
             });
         }
-        let casting = self.forest.as_ref().zip(work.as_ref()).and_then(|(f, w)| f.casting_trees(w));
-        self.shadows.record(&mut recorder, &self.view, &self.terrain, &shadows, casting);
+        let casting = self.forest.as_ref().and_then(Forest::casting);
+        self.shadows.record(&mut recorder, &self.view, &self.terrain, casting);
         let ground = (&self.terrain, &draws);
         recorder.stage("image", |r| {
             if let Some(sky) = &self.sky {
@@ -355,7 +326,7 @@ impl Renderer {
         let ms = |from: u64, to: u64| to.saturating_sub(from) as f64 * 1e-6;
         let after = self.evicted();
 
-        let trees = self.count_trees(cascades.len(), work.as_ref(), &shadows)?;
+        let trees = self.count_trees(cascades.len())?;
         let report = FrameReport {
             start_ns,
             stream_ms: ms(start_ns, record_ns),
@@ -363,8 +334,9 @@ impl Renderer {
             cpu_ms,
             produced: Tiles {
                 terrain: draws.fresh.1,
-                seeds: work.as_ref().map_or(0, ForestWork::fresh_quads),
-                coverage: work.as_ref().map_or(0, |w| w.coverage.tiles),
+                seeds: work.as_ref().map_or(0, |(seeds, _)| seeds.fresh.1)
+                    + self.casters().map_or(0, CasterData::fresh_quads),
+                coverage: work.as_ref().map_or(0, |(_, coverage)| coverage.tiles),
             },
             // A cache that is made anew begins to count again.
             evicted: Tiles {
@@ -381,20 +353,15 @@ impl Renderer {
     }
 
     /// Reads how many trees a frame drew.
-    fn count_trees(
-        &self,
-        cascades: usize,
-        work: Option<&ForestWork>,
-        shadows: &ShadowWork,
-    ) -> Result<TreeCounts> {
+    fn count_trees(&self, cascades: usize) -> Result<TreeCounts> {
         let mut counts = TreeCounts::default();
         let Some(Forest { seeds, near: Some(near), .. }) = &self.forest else { return Ok(counts) };
         if seeds.visible > 0 {
             counts.camera = near.cull.count(&self.gpu)?;
         }
         counts.cascades = vec![0; cascades];
-        if let Some((casters, work)) = near.casters.as_ref().zip(work) {
-            for (block, count) in shadows.blocks.iter().zip(casters.counts(&self.gpu, &work.casters)?) {
+        if let Some(casters) = &near.casters {
+            for (block, count) in self.shadows.work.blocks.iter().zip(casters.counts(&self.gpu)?) {
                 counts.cascades[block.cascade] += count;
             }
         }
@@ -418,6 +385,16 @@ impl Renderer {
     pub fn picture(&self) -> Result<Picture> {
         let _read = info_span!("read back").entered();
         Picture::read(&self.gpu, &self.plan, &self.targets, self.light.scale)
+    }
+
+    /// The shadow maps.
+    pub fn shadows(&self) -> &Shadows {
+        &self.shadows
+    }
+
+    /// What finds the trees that cast shadows.
+    pub fn casters(&self) -> Option<&CasterData> {
+        self.forest.as_ref()?.near.as_ref()?.casters.as_ref()
     }
 
     /// The device that draws.

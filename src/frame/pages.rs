@@ -130,6 +130,13 @@ impl Held {
 
 fn take(held: &mut [Option<[i64; 2]>], cascade: &Cascade, needed: &PageSet) -> PageSet {
     let first = cascade.first.map(|f| f / cascade.grid.page());
+    // What is drawn reaches over the borders of the pages that it is drawn for, and so into the places of pages beyond the square.
+    let last = first.map(|f| f + SIDE as i64);
+    for place in held.iter_mut() {
+        if place.is_some_and(|p| (0..2).any(|k| !(first[k]..last[k]).contains(&p[k]))) {
+            *place = None;
+        }
+    }
     let mut fresh = PageSet::default();
     for (y, row) in needed.rows.iter().enumerate() {
         let mut rest = *row;
@@ -218,7 +225,7 @@ mod tests {
         let c = cascade([1000, -2000]);
         let mut set = PageSet::default();
         // Pages are 2 m; the square begins at (500, -1000) m.
-        set.add(&c, &square(510.6, -990.0, 0.2));
+        set.add(&c, &square(510.2, -990.0, 0.2));
         assert_eq!(count(&set), 4, "margins of 1.5 m: pages 4 and 5 in both");
         assert!(
             set.touches(&c, &square(509.2, -991.0, 0.1)) && !set.touches(&c, &square(515.0, -990.0, 9.0))
@@ -269,6 +276,8 @@ mod tests {
         assert_eq!((fresh(&c), fresh(&c)), (2 * 64 + 62, 0));
         c.first = [-392 + 256 * 7, 80];
         assert_eq!(fresh(&c), 4096, "the same places, other pages");
+        c.first = [-392, 80];
+        assert_eq!(fresh(&c), 4096, "which were drawn over");
         c.grid.lowest = 1.0;
         assert_eq!((fresh(&c), fresh(&c)), (4096, 0));
     }

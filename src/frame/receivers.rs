@@ -21,10 +21,11 @@ struct Search<'a> {
 }
 
 /// The pages of each cascade that an eye may look into, on ground with trees up to `tall` metres high, and as far to the sides.
+/// What is seen is in the frustum; a tree looks into the cascade of its middle, which may be as far from what is seen of it.
 pub fn needed(tree: &Quadtree, eye: &Eye, cascades: &[Cascade], tall: f64) -> Vec<PageSet> {
     let needed = vec![PageSet::default(); cascades.len()];
     let mut search = Search { tree, eye, planes: eye.planes(), cascades, tall, needed };
-    search.visit([0.0; 2], tree.extent());
+    search.visit([-tall; 2], tree.extent().map(|e| e + tall));
     search.needed
 }
 
@@ -38,12 +39,13 @@ impl Search<'_> {
         let from = |c: usize| if c == 0 { 0.0 } else { self.cascades[c - 1].far };
         let farthest = bounds.farthest(self.eye.position);
         // Room for single precision, with which shaders choose.
-        let within = |c: &usize| nearest <= 1.0001 * self.cascades[*c].far && farthest >= 0.9999 * from(*c);
+        let within = |c: &usize| {
+            nearest <= 1.0001 * self.cascades[*c].far + self.tall && farthest >= 0.9999 * from(*c) - self.tall
+        };
         let reached: Vec<usize> = (0..self.cascades.len()).filter(within).collect();
         let Some(finest) = reached.first() else { return };
         let grid = &self.cascades[*finest].grid;
-        // Trees blur what is smaller than they are.
-        let enough = (PAGES * grid.page() as f64 * grid.texel).max(0.5 * self.tall);
+        let enough = PAGES * grid.page() as f64 * grid.texel;
         let size = [0, 1].map(|k| high[k] - low[k]);
         if size[0].max(size[1]) <= enough {
             for c in reached {
@@ -60,15 +62,13 @@ impl Search<'_> {
         self.visit(second, high);
     }
 
-    /// Bounds of what is drawn on a rectangle of ground: the ground as the camera's mesh has it, and trees that stand there.
+    /// Bounds of what is drawn above a rectangle: ground as the camera's mesh has it, and what of trees reaches there.
     fn bounds(&self, low: [f64; 2], high: [f64; 2]) -> Bounds {
         let flat = Bounds { low: [low[0], low[1], 0.0], high: [high[0], high[1], 0.0] };
         let eye = self.eye.position;
         let cell = (CELL * flat.farthest([eye[0], eye[1], 0.0]).hypot(eye[2])).max(self.tree.step());
-        let ground = self.tree.ground_bounds(low.map(|v| v - cell), high.map(|v| v + cell));
-        Bounds {
-            low: [low[0] - self.tall, low[1] - self.tall, ground.low[2]],
-            high: [high[0] + self.tall, high[1] + self.tall, ground.high[2] + self.tall],
-        }
+        let around = cell.max(self.tall);
+        let ground = self.tree.ground_bounds(low.map(|v| v - around), high.map(|v| v + around));
+        Bounds { low: [low[0], low[1], ground.low[2]], high: [high[0], high[1], ground.high[2] + self.tall] }
     }
 }

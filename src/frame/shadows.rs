@@ -7,7 +7,7 @@ use super::pages::{Block, Held, blocks};
 use super::receivers;
 use super::shadow_ground::squares;
 use crate::Result;
-use crate::forest::casters::{CasterData, CasterWork, DrawnBlock};
+use crate::forest::casters::{CasterData, DrawnBlock};
 use crate::forest::quadtree::Quadtree;
 use crate::forest::seeds::SeedData;
 use crate::forest::species::SpeciesData;
@@ -37,6 +37,8 @@ struct GroundPush {
 pub struct Shadows {
     /// Depth of the caster nearest the sun, one layer a cascade; it repeats.
     pub map: Image,
+    /// What this frame draws.
+    pub work: ShadowWork,
     held: Held,
     blocks: Buffer,
     sums: Buffer,
@@ -66,8 +68,6 @@ pub struct ShadowWork {
 pub struct CastingTrees<'a> {
     /// Where they are found.
     pub data: &'a CasterData,
-    /// Which.
-    pub work: &'a CasterWork,
     /// Their seeds.
     pub seeds: &'a SeedData,
     /// Their species.
@@ -107,6 +107,7 @@ impl Shadows {
             cells.flat_map(|k| [k, k + 1, k + side + 1, k, k + side + 1, k + side]).collect();
         Ok(Shadows {
             map,
+            work: ShadowWork::default(),
             held: Held::default(),
             blocks: gpu.buffer("shadow blocks", 16 * size_of::<ShadowBlock>() as u64)?,
             sums: gpu.buffer("shadow page sums", 0)?,
@@ -143,7 +144,7 @@ impl Shadows {
         tree: &Quadtree,
         eye: &Eye,
         cascades: &[Cascade],
-    ) -> Result<ShadowWork> {
+    ) -> Result<()> {
         let needed = receivers::needed(tree, eye, cascades, if plan.z_fields { plan.tallest } else { 0.0 });
         let fresh = self.held.take(cascades, &needed);
         let [lowest, highest] = tree.total_range();
@@ -158,7 +159,8 @@ impl Shadows {
             }
         }
         if work.blocks.is_empty() {
-            return Ok(work);
+            self.work = work;
+            return Ok(());
         }
         let on_gpu: Vec<ShadowBlock> = work.blocks.iter().map(|b| b.gpu).collect();
         gpu.renew(&mut self.blocks, "shadow blocks", &on_gpu)?;
@@ -169,7 +171,8 @@ impl Shadows {
             gpu.renew(&mut self.squares, "casting ground", &all)?;
             work.ground = ranges;
         }
-        Ok(work)
+        self.work = work;
+        Ok(())
     }
 
     /// What was to be drawn may not have been: all is drawn anew.
@@ -183,9 +186,9 @@ impl Shadows {
         recorder: &mut Recorder,
         view: &Buffer,
         terrain: &TerrainData,
-        work: &ShadowWork,
         trees: Option<CastingTrees>,
     ) {
+        let work = &self.work;
         if self.map.size() == [1; 2] {
             return;
         }
@@ -194,15 +197,15 @@ impl Shadows {
             depth: Some(Attachment { image: &self.map, resolve: None, clear: None }),
             layers: self.map.layers(),
         };
-        let batches = trees.map_or(0, |t| t.work.batches.len());
+        let batches = trees.map_or(0, |t| t.data.work.batches.len());
         for batch in 0..batches.max(1) {
             if let Some(t) = trees.filter(|_| !work.blocks.is_empty()) {
                 // Seeds of the first batch are produced with those that the camera sees.
-                if let Some(b) = t.work.batches.get(batch).filter(|_| batch > 0) {
+                if let Some(b) = t.data.work.batches.get(batch).filter(|_| batch > 0) {
                     t.seeds.produce(recorder, &[t.data.fresh(b)], terrain, t.species);
                 }
                 let buffers = (&self.blocks, &self.sums);
-                t.data.record(recorder, view, buffers, t.seeds, t.species, t.work, batch);
+                t.data.record(recorder, view, buffers, t.seeds, t.species, batch);
             }
             recorder.render("shadows", &targets, |pass| {
                 if batch == 0 {
@@ -254,7 +257,7 @@ impl Shadows {
         trees: CastingTrees,
         batch: usize,
     ) {
-        let Some(b) = trees.work.batches.get(batch) else { return };
+        let Some(b) = trees.data.work.batches.get(batch) else { return };
         pass.bind(
             program,
             &[
@@ -269,7 +272,7 @@ impl Shadows {
             let drawn = &work.blocks[*block];
             self.scissor(pass, drawn);
             pass.push(&drawn.gpu);
-            let command = trees.work.command(batch, *block);
+            let command = trees.data.work.command(batch, *block);
             pass.draw_indexed_indirect(&trees.seeds.quad_indices, &trees.data.commands, command);
         }
     }

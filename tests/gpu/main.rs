@@ -3,6 +3,7 @@
 #[path = "../common/device.rs"]
 mod device;
 
+mod casters;
 mod coverage;
 mod cull;
 mod determinism;
@@ -17,6 +18,7 @@ mod paths;
 mod plan;
 mod seeds;
 mod shader_map;
+mod shadows_kept;
 mod silhouettes;
 mod soak;
 mod tables;
