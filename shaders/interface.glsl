@@ -3,9 +3,12 @@
 const uint MAX_SPECIES = 8u;          // most species in a scene
 const uint MAX_CASCADES = 4u;         // most shadow cascades
 const uint DISTANCE_BINS = 32u;       // bins of the camera's list of trees, front to back
-const uint TREE_LISTS = 37u;          // lists that a seed can be in: all, one of the bins, each cascade
+const uint TREE_LISTS = 33u;          // lists that a seed can be in: all, one of the bins
 const uint CAMERA_DRAWS = 4u;          // draws of the camera's list: near, middle, far and converged bins
 const uint CULL_GROUP = 256u;         // seeds a workgroup of the cull
+const uint SHADOW_PAGES = 64u;        // pages along a side of a shadow cascade: what is kept, and what is drawn at once
+const float SHADOW_DEPTHS = 16.0;     // depth range of a cascade over its width
+const uint SHADOW_CELLS = 8u;         // mesh cells along a side of a square of ground that casts
 const uint TERRAIN_CELLS = 32u;       // mesh cells along a side of a terrain quad
 const uint TERRAIN_HEIGHTS = 33u;     // height samples along a side of a terrain tile
 const uint FOREST_NODES = 17u;        // shader-map nodes along a side of a terrain quad: every second vertex
@@ -30,13 +33,14 @@ struct View {
     mat4 clip_from_world;             // reverse Z, infinite far
     mat4 cascade_from_world[4];       // xy in [-1, 1]; z in [0, 1], 1 at the sun's side
     vec4 planes[6];                   // of the view frustum: dot(xyz, p) + w >= 0 inside
-    vec4 cascade_planes[12];          // three a cascade: direction and half extent: abs(dot(xyz, p) + c) <= w
-    vec4 cascade_centres[4];          // c of the three cascade planes
+    vec4 cascade_turn[4];             // xy: texel of the map where the cascade's first texel is; those beyond the end begin anew
     vec4 cascade_texel;               // metres a texel of each cascade
     vec4 cascade_far;                 // distance to which each cascade is used, m
     vec4 bins[8];                     // squared upper distances of the distance bins
     vec3 sun_direction;               // unit, towards the sun
     uint cascade_count;               // 0: no sun
+    vec3 cascade_x;                   // unit, axis x of all cascades
+    vec3 cascade_y;                   // unit, axis y
     vec3 sun_irradiance;              // on a plane facing the sun, times the exposure scale
     float pixels_at_1m;               // pixels that one metre covers at one metre
     vec3 sky_radiance;                // mean over the upper hemisphere, times the exposure scale
@@ -146,7 +150,7 @@ struct PatternPoint {
     vec2 position;                    // in [0, 1) of the tile's side; x negative: unused slot
 };
 
-// A tree that is seen by the camera or a cascade, with what drawing it takes.
+// A tree that is seen by the camera, with what drawing it takes.
 struct Tree {
     vec3 centre;                      // of its box, from the camera, m
     float scale;                      // of the model
@@ -167,6 +171,58 @@ struct Tree {
     float own;                        // 1 - nu: weight of the tree's own light
     vec3 mean_sky;                    // average radiance from the sky, times nu
     float mean_lit;                   // average k_t / (k_t + k_t-bar), times nu
+};
+
+// What of a cascade lies between two seams of its map, and how the world is drawn there. Its coordinates are world-fixed: x and
+// y texels of the map, z depth. Also the push constants of the draws.
+struct ShadowBlock {
+    vec3 x;                           // axis x, texels a metre
+    uint cascade;                     // layer of the map
+    vec3 y;                           // axis y, texels a metre
+    float to_clip;                    // 2 / texels along the map
+    vec3 z;                           // towards the sun, depth a metre
+    float ground;                     // height to which the corners of quads refer, m
+    ivec2 first;                      // first page drawn
+    ivec2 last;                       // first page beyond
+    int sums;                         // of its page (0, 0) in the table of sums
+    float texels_per_metre;           // of the map
+    float pages_per_texel;            // 1 / texels along a page
+    float depth_per_metre;            // length of z
+};
+
+// A seed quad whose trees may cast into what is drawn of a block.
+struct CasterQuad {
+    vec3 corner;                      // of its south-west corner in the block, at the block's ground
+    uint region;                      // its region in the seed buffer
+    uint block;                       // index
+    uint base;                        // first record of the block
+};
+
+// A tree that casts.
+struct Caster {
+    vec3 place;                       // of its box's centre in the block
+    float scale;                      // of the model
+    vec2 turn;                        // cosine and sine of its rotation
+    uint species;                     // index
+    uint light_layers;                // three z-field views nearest the light direction, 10 bits each
+    vec2 light_weights;               // of the first two views
+    float mip;                        // of the views
+    uint dither;                      // hash
+};
+
+// What finding casters takes.
+struct CasterParameters {
+    uint first_quad;                  // of this dispatch
+    uint groups_per_region;           // workgroups a region
+    uint region_capacity;             // seeds a region
+    uint first_command;               // of this dispatch: one a block
+};
+
+// A square of ground that casts into a block.
+struct GroundCaster {
+    vec4 corners[4];                  // in the block, at its ground: south-west, south-east, north-west, north-east
+    ivec2 corner;                     // south-west corner on the terrain's finest grid
+    int spacing;                      // finest grid steps a mesh cell
 };
 
 // An indexed indirect draw.

@@ -20,6 +20,10 @@ const QUADS_IN_RANGE: f64 = 24.0;
 const SILHOUETTE_QUADS: f64 = 8.0;
 /// Side that no quad of the finest level of a plain with trees exceeds, m: their coverage tiles get fine near the camera.
 const PLAIN_SIDE: f64 = 160.0;
+/// Seed quads that only cast shadows which memory holds at once; where there are more they take turns.
+const SHADOW_QUADS: f64 = 128.0;
+/// Trees whose casting memory holds at once; where there are more they take turns.
+const CASTERS: u32 = 1 << 17;
 /// Coverage tiles for a view whose terrain is as coarse as it may be: about thirty quads a level, eight levels.
 const COVER_SLOTS: f64 = 256.0;
 /// Storage buffers that every Vulkan device binds, when no device is known.
@@ -187,10 +191,14 @@ pub struct Plan {
     /// Of these, how many there are for quads beyond the range with trees on silhouettes. Where there are more in view, the
     /// farthest go without such trees.
     pub silhouette_quads: u32,
+    /// Of them also, how many there are for quads that the camera does not see, whose trees cast shadows.
+    pub shadow_quads: u32,
     /// Seeds a region.
     pub region_capacity: u32,
     /// Trees drawn one by one, at most.
     pub tree_capacity: u32,
+    /// Trees that cast which are drawn at once, at most.
+    pub caster_capacity: u32,
     /// Quads of terrain in a frame, at most.
     pub terrain_tiles: u32,
     /// Tiles of heights and slopes: as many, or the one of level ground.
@@ -276,8 +284,10 @@ impl Plan {
             pattern_density: 0.0,
             seed_regions: 1,
             silhouette_quads: 0,
+            shadow_quads: 0,
             region_capacity: gpu::CULL_GROUP,
             tree_capacity: 1,
+            caster_capacity: 0,
             terrain_tiles: if scene.terrain.heights.is_some() { 1024 } else { 1 },
             height_tiles: 1,
             plain_side: f64::INFINITY,
@@ -304,7 +314,8 @@ impl Plan {
                 plan.transfer_bands = scene.settings.transfer_bands;
             }
             if !plan.z_fields {
-                (plan.seed_regions, plan.silhouette_quads, plan.tree_capacity) = (0, 0, 0);
+                (plan.seed_regions, plan.silhouette_quads, plan.shadow_quads) = (0, 0, 0);
+                (plan.tree_capacity, plan.caster_capacity) = (0, 0);
             }
         }
         if scene.terrain.heights.is_some() {
@@ -440,22 +451,34 @@ impl Plan {
         };
         let region_bytes = u64::from(self.region_capacity) * size_of::<gpu::Seed>() as u64;
         let most = (storage / region_bytes).max(1);
-        let near = (across(0) * across(1)).min(most as f64);
+        let exist = [0, 1].map(|k| (extent[k] / self.quad_side).ceil().max(1.0));
+        let exist = exist[0] * exist[1];
+        let spare = if self.cascades > 0 { SHADOW_QUADS.min(most as f64 / 2.0).floor() } else { 0.0 };
+        let near = (across(0) * across(1)).min(most as f64 - spare);
+        let spare = spare.min(exist - near);
         // Silhouettes beyond are lines: a few quads wide at any distance, however many quads there are.
         let lines = if self.silhouette_ratio > 1.0 {
             SILHOUETTE_QUADS * (self.last_range().min(farthest) - drawn) / self.quad_side
         } else {
             0.0
         };
-        let exist = [0, 1].map(|k| (extent[k] / self.quad_side).ceil().max(1.0));
-        self.silhouette_quads = lines.min(exist[0] * exist[1] - near).min(most as f64 - near).max(0.0) as u32;
-        self.seed_regions = near as u32 + self.silhouette_quads;
+        self.silhouette_quads =
+            lines.min(exist - near - spare).min(most as f64 - near - spare).max(0.0) as u32;
+        self.shadow_quads = spare as u32;
+        self.seed_regions = near as u32 + self.silhouette_quads + self.shadow_quads;
         // Few trees of such a quad stand on the line.
         let slots =
             (near as u64 + u64::from(self.silhouette_quads.div_ceil(4))) * u64::from(self.region_capacity);
         self.tree_capacity =
             u64::from(s.zfield_max_trees).min(slots).min(storage / size_of::<gpu::Tree>() as u64).max(1)
                 as u32;
+        if self.cascades > 0 {
+            // A quad may cast into four blocks of each cascade.
+            let most = storage / size_of::<gpu::Caster>() as u64;
+            let seeds = u64::from(self.seed_regions) * u64::from(self.region_capacity);
+            let one = 4 * u64::from(self.cascades) * u64::from(self.region_capacity);
+            self.caster_capacity = u64::from(CASTERS).min(2 * seeds).max(one).min(most) as u32;
+        }
     }
 
     /// Coverage tiles: how many, for a view at the terrain's level of detail.
@@ -558,11 +581,14 @@ impl Plan {
         }
         let slots = u64::from(self.seed_regions) * u64::from(self.region_capacity);
         if self.z_fields {
-            let near = self.seed_regions - self.silhouette_quads;
+            let near = self.seed_regions - self.silhouette_quads - self.shadow_quads;
             let mut reason = format!("{near} quads of {:.0} m within {:.0} m", self.quad_side, self.range);
             if self.silhouette_quads > 0 {
                 let far = self.last_range();
                 reason += &format!(", {} with silhouettes to {far:.0} m", self.silhouette_quads);
+            }
+            if self.shadow_quads > 0 {
+                reason += &format!(", {} whose trees only cast shadows", self.shadow_quads);
             }
             add("cache", "seeds", reason, slots * size_of::<gpu::Seed>() as u64);
         }
@@ -590,9 +616,17 @@ impl Plan {
                     "target",
                     "trees and lists",
                     format!("up to {capacity} trees in a frame"),
-                    capacity * (size_of::<gpu::Tree>() as u64 + 4 * u64::from(1 + gpu::MAX_CASCADES) + 24)
+                    capacity * (size_of::<gpu::Tree>() as u64 + 4 + 24)
                         + slots * 4
                         + slots / u64::from(gpu::CULL_GROUP) * 4 * u64::from(gpu::TREE_LISTS),
+                );
+            }
+            if self.z_fields && self.cascades > 0 {
+                add(
+                    "target",
+                    "casters",
+                    format!("up to {} trees that cast at once", self.caster_capacity),
+                    u64::from(self.caster_capacity) * size_of::<gpu::Caster>() as u64,
                 );
             }
             add(
@@ -645,6 +679,9 @@ impl Plan {
             for name in ["cull", "prefix sums", "draw commands", "compact"] {
                 pass(name, "which trees are seen, in order");
             }
+        }
+        if self.z_fields && self.cascades > 0 {
+            pass("casters", "which trees cast shadows");
         }
         if self.cascades > 0 {
             pass("shadows", "the sun is up");

@@ -1,5 +1,4 @@
-// Totals of the lists become draw commands: the camera's trees (bins one after the other, in four draws), then each
-// cascade's casters.
+// Totals of the lists become draw commands: the camera's trees, bins one after the other, in four draws.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
@@ -11,7 +10,7 @@ layout(std430, binding = 2) buffer Starts { uint items[]; } starts;
 layout(push_constant) uniform Push { CullParameters p; };
 
 void main() {
-    // All trees that someone sees; then the camera's list, bin after bin; then the cascades' lists, each of its own.
+    // All trees that are seen; then the camera's list, bin after bin.
     starts.items[0] = 0u;
     uint at = 0u;
     for (uint bin = 0u; bin < DISTANCE_BINS; bin++) {
@@ -26,11 +25,5 @@ void main() {
         uint end = ends[k] < DISTANCE_BINS ? starts.items[1u + ends[k]] : at;
         commands.items[k] = DrawCommand(fits ? 6u * (end - first) : 0u, 1u, 0u, int(4u * first), 0u);
         first = end;
-    }
-    for (uint c = 0u; c < MAX_CASCADES; c++) {
-        uint list = 1u + DISTANCE_BINS + c;
-        starts.items[list] = (1u + c) * p.tree_capacity;
-        commands.items[CAMERA_DRAWS + c] =
-            DrawCommand(fits ? 6u * totals.items[list] : 0u, 1u, 0u, int(4u * (1u + c) * p.tree_capacity), 0u);
     }
 }

@@ -126,14 +126,6 @@ void main() {
     Species kind = species.items[s.species_density & 0xffffu];
     uint index = counts.items[group] + rank_in(0u, thread);
     trees.items[index] = make_tree(q, s, tree_centre(view.v, q, s, kind), kind);
-    if ((seen & CLASS_CAMERA) != 0u) {
-        uint list = 1u + (seen & 31u);
-        lists.items[starts.items[list] + counts.items[list * p.group_count + group] + rank_in(list, thread)] = index;
-    }
-    for (uint c = 0u; c < MAX_CASCADES; c++) {
-        uint list = 1u + DISTANCE_BINS + c;
-        if ((seen >> (8u + c) & 1u) != 0u) {
-            lists.items[starts.items[list] + counts.items[list * p.group_count + group] + rank_in(list, thread)] = index;
-        }
-    }
+    uint list = 1u + (seen & 31u);
+    lists.items[starts.items[list] + counts.items[list * p.group_count + group] + rank_in(list, thread)] = index;
 }

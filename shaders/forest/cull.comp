@@ -1,5 +1,4 @@
-// Which seeds does the camera see, and which cast shadows into which cascade? Writes each seed's class and, a
-// workgroup, how many of its seeds are in each list. Twin of the decision: src/forest/cull.rs.
+// Which seeds does the camera see? Writes each seed's class and, a workgroup, how many of its seeds are in each list. Twin of the decision: src/forest/cull.rs.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"

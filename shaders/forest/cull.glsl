@@ -4,7 +4,6 @@
 #include "land/silhouette.glsl"
 
 const uint CLASS_CAMERA = 1u << 5u;   // low five bits: distance bin
-const uint CLASS_CASCADE = 1u << 8u;  // and three more for the other cascades
 
 // Centre of a tree's box from the camera, m.
 vec3 tree_centre(View v, SeedQuad q, Seed s, Species kind) {
@@ -26,7 +25,7 @@ float tree_height(Species kind, float scale) {
     return height;
 }
 
-// 0 if no one sees it.
+// 0 if the camera does not see it.
 uint classify(View v, SeedQuad q, Seed s, Species kind, vec3 centre, sampler2DArray heights) {
     precise float radius = kind.bounding_radius * s.scale;
     precise float d2 = precise_dot(centre, centre);
@@ -35,7 +34,6 @@ uint classify(View v, SeedQuad q, Seed s, Species kind, vec3 centre, sampler2DAr
     precise float last = end * v.silhouette_ratio;
     if (d2 >= last * last) return 0u;
     bool beyond = d2 >= end * end;
-    uint seen = 0u;
     bool inside = true;
     for (int k = 0; k < 6; k++) {
         precise float d = precise_dot(v.planes[k].xyz, centre) + v.planes[k].w;
@@ -44,19 +42,7 @@ uint classify(View v, SeedQuad q, Seed s, Species kind, vec3 centre, sampler2DAr
     if (silhouette(v, q, s, centre, tree_height(kind, s.scale), heights, inside && beyond) > 0.0 || (inside && !beyond)) {
         uint bin = 0u;
         for (uint k = 0u; k < DISTANCE_BINS - 1u; k++) bin += d2 > v.bins[k >> 2u][k & 3u] ? 1u : 0u;
-        seen = CLASS_CAMERA | bin;
+        return CLASS_CAMERA | bin;
     }
-    // Shadows end before the range.
-    for (uint c = 0u; c < v.cascade_count; c++) {
-        bool casts = !beyond;
-        for (uint k = 0u; k < 2u; k++) {
-            precise float d = precise_dot(v.cascade_planes[3u * c + k].xyz, centre) + v.cascade_centres[c][k];
-            casts = casts && abs(d) <= v.cascade_planes[3u * c + k].w + radius;
-        }
-        // Along the sun's direction only what lies beyond the cascade is out: anything before it casts into it.
-        precise float along = precise_dot(v.cascade_planes[3u * c + 2u].xyz, centre) + v.cascade_centres[c].z;
-        casts = casts && along >= -(v.cascade_planes[3u * c + 2u].w + radius);
-        if (casts) seen |= CLASS_CASCADE << c;
-    }
-    return seen;
+    return 0u;
 }

@@ -12,8 +12,5 @@ void enlist(uint seen, uint thread) {
     uint word = thread >> 5u, bit = 1u << (thread & 31u);
     if (seen == 0u) return;
     atomicOr(members[word], bit);
-    if ((seen & CLASS_CAMERA) != 0u) atomicOr(members[(1u + (seen & 31u)) * 8u + word], bit);
-    for (uint c = 0u; c < MAX_CASCADES; c++) {
-        if ((seen >> (8u + c) & 1u) != 0u) atomicOr(members[(1u + DISTANCE_BINS + c) * 8u + word], bit);
-    }
+    atomicOr(members[(1u + (seen & 31u)) * 8u + word], bit);
 }

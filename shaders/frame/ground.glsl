@@ -6,7 +6,7 @@ layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 3) uniform sampler2DArray slope_tiles;
 layout(binding = 4) uniform sampler2DArray albedo;
 layout(binding = 5) uniform sampler2DArray shadow_map;
-layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
+layout(push_constant) uniform Push { TerrainParameters p; };
 
 #include "forest/expected.glsl"
 #include "frame/cover.glsl"
@@ -41,9 +41,9 @@ float shadow_maps(vec3 position, vec3 n, float cosine, float distance) {
     // Ground that curves within a texel would shade itself: half a texel towards the sun, more where the sun grazes.
     float texel = view.v.cascade_texel[c];
     vec3 from = position + n * (texel * sqrt(1.0 - cosine * cosine)) + view.v.sun_direction * (0.5 * texel);
-    vec2 gradient = plane_gradient(n, view.v.cascade_planes[3u * c].xyz, view.v.cascade_planes[3u * c + 1u].xyz,
-                                   view.v.sun_direction);
-    return sun_visibility(shadow_map, (view.v.cascade_from_world[c] * vec4(from, 1.0)).xyz, gradient, c);
+    vec2 gradient = plane_gradient(n, view.v.cascade_x, view.v.cascade_y, view.v.sun_direction);
+    vec3 at = (view.v.cascade_from_world[c] * vec4(from, 1.0)).xyz;
+    return sun_visibility(shadow_map, at, gradient, view.v.cascade_turn[c].xy, c);
 }
 
 // Unit normal of the ground.

@@ -4,7 +4,7 @@
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(std430, binding = 1) readonly buffer Quads { TerrainQuad items[]; } quads;
 layout(binding = 2) uniform sampler2DArray height_tiles;
-layout(push_constant) uniform Push { TerrainParameters p; uint cascade; };
+layout(push_constant) uniform Push { TerrainParameters p; };
 
 // Place on the finest grid of a vertex of a quad; the terrain ends at its last sample.
 vec2 grid_place(TerrainQuad q, ivec2 at) { return min(vec2(q.corner + at * q.spacing), p.last); }

@@ -1,7 +1,7 @@
 // Shadow maps: depth towards the sun, 1 nearest. Twin: src/physics/shadow.rs.
 
-// Change of depth in a cascade (z in [0, 1] over the width of xy in [-1, 1]) along its axes x and y, on a plane with the
-// normal n; at most that of a plane 76 degrees from facing the sun.
+// Change of depth, in widths of the cascade, along its axes x and y (in [-1, 1]) on a plane with the normal n; at most that of a
+// plane 76 degrees from facing the sun.
 vec2 plane_gradient(vec3 n, vec3 x, vec3 y, vec3 sun) {
     return clamp(vec2(dot(n, x), dot(n, y)) * (-0.5 / max(dot(n, sun), 1e-3)), -2.0, 2.0);
 }
@@ -19,14 +19,15 @@ vec4 caster_visibility(vec4 casters, vec4 depths) { return vec4(lessThanEqual(ca
 // Bilinear blend over the four texels around a position in [-1, 1]^2; lit outside, and behind the far side, where casters' depths
 // are cut off at 0, by what is before it. Casters are drawn at the texels' centres:
 // the ground goes on to there with its gradient, so its depth to compare with is the plane's there. Crowns are round: 0.
-float sun_visibility(sampler2DArray map, vec3 at, vec2 gradient, uint cascade) {
+// The map repeats: `turn` is its texel where the cascade's first one is.
+float sun_visibility(sampler2DArray map, vec3 at, vec2 gradient, vec2 turn, uint cascade) {
     float side = float(textureSize(map, 0).x);
     vec2 t = (at.xy * 0.5 + 0.5) * side - 0.5;
     vec2 cell = floor(t), f = t - cell;
-    vec2 step = gradient * (2.0 / side);
+    vec2 step = gradient * (2.0 / (SHADOW_DEPTHS * side));
     vec4 depths = max(at.z + step.x * (vec4(0.0, 1.0, 1.0, 0.0) - f.x) + step.y * (vec4(1.0, 1.0, 0.0, 0.0) - f.y), 0.0);
     // Gathered at the corner that the four texels share, so that they are the ones that f weighs.
-    vec4 lit = caster_visibility(textureGather(map, vec3((cell + 1.0) / side, float(cascade))), depths);
+    vec4 lit = caster_visibility(textureGather(map, vec3((cell + turn + 1.0) / side, float(cascade))), depths);
     vec2 along = mix(lit.wx, lit.zy, f.x);
     return all(lessThan(abs(at.xy), vec2(1.0))) ? mix(along.x, along.y, f.y) : 1.0;
 }

@@ -230,9 +230,9 @@ impl CoverageData {
             work.batches.push(batch);
         }
         work.tiles = jobs.len() as u32;
-        renew(gpu, &mut self.jobs, "coverage jobs", &jobs)?;
-        renew(gpu, &mut self.quads, "coverage quads", &quads)?;
-        renew(gpu, &mut self.splats, "coverage splats", &splats)?;
+        gpu.renew(&mut self.jobs, "coverage jobs", &jobs)?;
+        gpu.renew(&mut self.quads, "coverage quads", &quads)?;
+        gpu.renew(&mut self.splats, "coverage splats", &splats)?;
         Ok(work)
     }
 
@@ -371,13 +371,4 @@ impl CoverageData {
             }
         });
     }
-}
-
-/// Uploads into a buffer, made anew when it is too small.
-fn renew<T: bytemuck::Pod>(gpu: &Gpu, buffer: &mut Buffer, name: &str, content: &[T]) -> Result<()> {
-    let bytes = size_of_val(content) as u64;
-    if bytes > buffer.bytes() {
-        *buffer = gpu.buffer(name, bytes.next_power_of_two())?;
-    }
-    gpu.upload(buffer, 0, content)
 }

@@ -10,7 +10,7 @@ use super::tables::TableData;
 use super::terrain::TerrainData;
 use crate::gpu::interface::{
     CAMERA_DRAWS, CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, FADE_FIRST, FADE_RATE, FADE_SPREAD,
-    MAX_CASCADES, Seed, SeedQuad, Species, TREE_LISTS, Tree, View,
+    Seed, SeedQuad, Species, TREE_LISTS, Tree, View,
 };
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders, vk};
 use crate::land::silhouette::clearance;
@@ -21,7 +21,7 @@ use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::{Error, Result};
 
-const _: () = assert!(TREE_LISTS == 1 + DISTANCE_BINS + MAX_CASCADES);
+const _: () = assert!(TREE_LISTS == 1 + DISTANCE_BINS);
 // The band over which trees fade is that of the models.
 const _: () = assert!(FADE_FIRST == handover::FADE_FIRST as f32);
 const _: () = assert!(FADE_SPREAD == handover::FADE_SPREAD as f32);
@@ -29,16 +29,14 @@ const _: () = assert!(FADE_RATE == handover::FADE_RATE as f32);
 
 /// A seed's class: seen by the camera; the low five bits are its distance bin.
 pub const CLASS_CAMERA: u32 = 1 << 5;
-/// A seed's class: casts into the first cascade; and three more bits for the others.
-pub const CLASS_CASCADE: u32 = 1 << 8;
 
 /// Buffers and programs of the cull.
 pub struct CullData {
-    /// Records of all trees that anyone sees.
+    /// Records of all trees that are seen.
     pub trees: Buffer,
-    /// Indices into `trees`: the camera's, then each cascade's, `tree_capacity` apart.
+    /// Indices into `trees`, bin after bin.
     pub lists: Buffer,
-    /// Draw commands: the camera's near, middle, far and converged trees, then each cascade's.
+    /// Draw commands: near, middle, far and converged trees.
     pub commands: Buffer,
     /// Number of trees in each list.
     pub totals: Buffer,
@@ -57,11 +55,9 @@ pub struct CullData {
 /// How many trees a frame draws.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct TreeCounts {
-    /// Trees that the camera or a cascade sees.
-    pub records: u32,
     /// Trees in view.
     pub camera: u32,
-    /// Casters of each cascade.
+    /// Casters drawn into each cascade: those of pages that frames before have not left.
     pub cascades: Vec<u32>,
 }
 
@@ -88,11 +84,8 @@ impl CullData {
                 trees * size_of::<Tree>() as u64,
                 (vk::Format::R32G32B32A32_UINT, 16),
             )?,
-            lists: gpu.buffer("tree lists", trees * 4 * u64::from(1 + MAX_CASCADES))?,
-            commands: gpu.buffer(
-                "tree draws",
-                u64::from(CAMERA_DRAWS + MAX_CASCADES) * size_of::<DrawCommand>() as u64,
-            )?,
+            lists: gpu.buffer("tree lists", trees * 4)?,
+            commands: gpu.buffer("tree draws", u64::from(CAMERA_DRAWS) * size_of::<DrawCommand>() as u64)?,
             totals: gpu.buffer("tree totals", 4 * u64::from(TREE_LISTS))?,
             classes: gpu.buffer("seed classes", slots * 4)?,
             counts: gpu.buffer("list counts", groups * 4 * u64::from(TREE_LISTS))?,
@@ -165,20 +158,15 @@ impl CullData {
     ///
     /// # Errors
     /// [`Error::Usage`] when there were more than the plan holds.
-    pub fn counts(&self, gpu: &Gpu, cascades: usize) -> Result<TreeCounts> {
-        let totals: Vec<u32> = gpu.read(&self.totals, 0, TREE_LISTS as usize)?;
-        if totals[0] > self.capacity {
+    pub fn count(&self, gpu: &Gpu) -> Result<u32> {
+        let total = gpu.read::<u32>(&self.totals, 0, 1)?[0];
+        if total > self.capacity {
             return Err(Error::Usage(format!(
-                "{} trees in view, and the plan holds {}: raise zfield_max_trees or zfield_min_pixels",
-                totals[0], self.capacity
+                "{total} trees in view, and the plan holds {}: raise zfield_max_trees or zfield_min_pixels",
+                self.capacity
             )));
         }
-        let bins = 1..1 + DISTANCE_BINS as usize;
-        Ok(TreeCounts {
-            records: totals[0],
-            camera: totals[bins.clone()].iter().sum(),
-            cascades: totals[bins.end..bins.end + cascades].to_vec(),
-        })
+        Ok(total)
     }
 }
 
@@ -204,7 +192,7 @@ fn fade_end(u: f32) -> f32 {
     FADE_FIRST + FADE_SPREAD * u
 }
 
-/// Class of a seed, 0 if no one sees it; twin of `classify` in `shaders/forest/cull.glsl`, to the bit. `heights` is the
+/// Class of a seed, 0 if the camera does not see it; twin of `classify` in `shaders/forest/cull.glsl`, to the bit. `heights` is the
 /// terrain's height map.
 pub fn classify(
     view: &View,
@@ -225,19 +213,9 @@ pub fn classify(
     let beyond = d2 >= end * end;
     let height = (2.0 * species.scale_to_metres[2]) * seed.scale;
     let stays = || heights.is_some_and(|h| clearance(view, quad, seed, centre, height, h) > 0.0);
-    let mut seen = 0;
     if view.planes.iter().all(|p| dot(&p[..3]) + p[3] >= -radius) && (!beyond || stays()) {
         let bins = (0..DISTANCE_BINS as usize - 1).filter(|k| d2 > view.bins[k / 4][k % 4]).count();
-        seen = CLASS_CAMERA | bins as u32;
+        return CLASS_CAMERA | bins as u32;
     }
-    for c in 0..view.cascade_count as usize {
-        let plane = |k: usize| &view.cascade_planes[3 * c + k];
-        let along = |k: usize| dot(&plane(k)[..3]) + view.cascade_centres[c][k];
-        let casts =
-            (0..2).all(|k| along(k).abs() <= plane(k)[3] + radius) && along(2) >= -(plane(2)[3] + radius);
-        if casts && !beyond {
-            seen |= CLASS_CASCADE << c;
-        }
-    }
-    seen
+    0
 }

@@ -2,6 +2,7 @@
 //! draws.
 
 pub mod cache;
+pub mod casters;
 pub mod coverage;
 pub mod cull;
 pub mod seeds;

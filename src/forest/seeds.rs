@@ -40,6 +40,9 @@ pub struct SeedData {
     pub(super) side: f64,
     listed_ranges: ListedRanges,
     cache: SlotCache<(i32, i32)>,
+    /// Regions that the camera leaves to quads that only cast.
+    spare: u32,
+    keys: Vec<(i32, i32)>,
     program: Program,
     top: f64,
 }
@@ -51,6 +54,9 @@ pub struct SeedWork {
     pub fresh: (u32, u32),
 }
 
+/// Quads whose seeds are to be produced: where they are, first and number.
+pub type FreshSeeds<'a> = (&'a Buffer, (u32, u32));
+
 impl SeedData {
     /// Allocates for a plan and bins listed trees to their quads.
     ///
@@ -59,10 +65,10 @@ impl SeedData {
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
         let slots = u64::from(plan.seed_regions) * u64::from(plan.region_capacity);
         let (listed, listed_ranges) = bin_listed(scene, plan.quad_side);
-        let indices: Vec<u32> =
-            (0..if plan.z_fields { plan.tree_capacity.max(plan.region_capacity) } else { 0 })
-                .flat_map(|k| [0, 1, 2, 2, 1, 3].map(|c| 4 * k + c))
-                .collect();
+        let drawn = plan.tree_capacity.max(plan.region_capacity).max(plan.caster_capacity);
+        let indices: Vec<u32> = (0..if plan.z_fields { drawn } else { 0 })
+            .flat_map(|k| [0, 1, 2, 2, 1, 3].map(|c| 4 * k + c))
+            .collect();
         let pattern = plan.pattern.as_ref().map_or_else(Vec::new, |p| p.packed());
         let heights = scene.terrain.heights.is_some();
         let mapped = |s: &&Species| density_map_size(s, scene.terrain.extent).is_some();
@@ -82,6 +88,8 @@ impl SeedData {
             species_count: gpu.buffer_with("species count", &[scene.species.len() as u32])?,
             listed_ranges,
             cache: SlotCache::new(plan.seed_regions),
+            spare: plan.shadow_quads,
+            keys: Vec::new(),
             program: gpu.compute(&shaders::FOREST_SEEDS_COMP, &[("DENSITY_MAPS", maps)])?,
             parameters: SeedParameters {
                 extent: scene.terrain.extent.map(|e| e as f32),
@@ -114,7 +122,7 @@ impl SeedData {
         (quad.map(|q| q as i32), [0, 1].map(|k| eye.position[k] - quad[k] * side))
     }
 
-    /// Selects the quads whose trees this frame may see or that cast into its view, and uploads them.
+    /// Selects the quads whose trees this frame may see, and uploads them.
     ///
     /// # Errors
     /// [`Error::Usage`] when the view needs more quads than the plan holds.
@@ -125,15 +133,15 @@ impl SeedData {
         plan: &Plan,
         tree: &Quadtree,
         eye: &Eye,
-        sweep: [f64; 3],
     ) -> Result<SeedWork> {
         self.cache.begin_frame();
         self.visible = 0;
         self.visible_quads.clear();
+        self.keys.clear();
         if !plan.z_fields {
             return Ok(SeedWork::default());
         }
-        let mut visible = self.select(tree, eye, plan.range, sweep);
+        let mut visible = self.select(tree, eye, plan.range);
         if let Some(heights) = scene.terrain.heights.as_ref().filter(|_| plan.silhouette_ratio > 1.0) {
             let ground = Ground { heights, terrain: &scene.terrain, lowest: tree.total_range()[0] };
             self.add_silhouettes(&ground, plan, tree, eye, &mut visible);
@@ -154,14 +162,38 @@ impl SeedData {
             }
         }
         self.visible = visible.len() as u32;
+        self.keys = visible;
         let work = SeedWork { fresh: (self.visible, fresh.len() as u32) };
         gpu.upload(&self.quads, 0, &self.visible_quads)?;
         gpu.upload(&self.quads, u64::from(self.visible) * size_of::<SeedQuad>() as u64, &fresh)?;
         Ok(work)
     }
 
-    /// Quads within `range` whose trees, or the trees' shadows (swept as far as `sweep`, away from the sun), may be in view.
-    fn select(&self, tree: &Quadtree, eye: &Eye, range: f64, sweep: [f64; 3]) -> Vec<(i32, i32)> {
+    /// Region of a quad that casts, and whether its seeds are still to be produced; `None` when all are in use.
+    pub(super) fn claim(&mut self, quad: (i32, i32)) -> Option<(SeedQuad, bool)> {
+        self.cache.slot(quad).map(|slot| (self.seed_quad(quad, slot.index), slot.fresh))
+    }
+
+    /// Gives the regions of what was claimed to others; those that the camera sees stay.
+    pub(super) fn release(&mut self) {
+        self.cache.begin_frame();
+        for quad in &self.keys {
+            self.cache.slot(*quad);
+        }
+    }
+
+    /// What was to be produced may not have been: no region holds anything.
+    pub fn forget(&mut self) {
+        self.cache = SlotCache::new(self.cache.capacity());
+    }
+
+    /// Number of quads along the terrain's sides.
+    pub(super) fn count(&self) -> [u32; 2] {
+        self.quad_count.map(|n| n as u32)
+    }
+
+    /// Quads within `range` whose trees may be in view.
+    fn select(&self, tree: &Quadtree, eye: &Eye, range: f64) -> Vec<(i32, i32)> {
         let side = f64::from(self.parameters.quad_side);
         let planes = eye.planes();
         let span = |k: usize| {
@@ -172,13 +204,8 @@ impl SeedData {
         let mut found = Vec::new();
         for y in span(1) {
             for x in span(0) {
-                // Shadows reach away from the sun.
                 let tall = self.tree_bounds(tree, (x, y));
-                let swept = Bounds {
-                    low: [0, 1, 2].map(|k| tall.low[k] + sweep[k].min(0.0)),
-                    high: [0, 1, 2].map(|k| tall.high[k] + sweep[k].max(0.0)),
-                };
-                if tall.distance(eye.position) <= range && swept.touches(&planes, eye.position) {
+                if tall.distance(eye.position) <= range && tall.touches(&planes, eye.position) {
                     found.push((x, y));
                 }
             }
@@ -187,10 +214,15 @@ impl SeedData {
         found
     }
 
-    /// Bounds of a quad's trees: crowns reach out of their quad, and up.
+    /// Bounds of a quad's trees.
     fn tree_bounds(&self, tree: &Quadtree, (x, y): (i32, i32)) -> Bounds {
-        let low = [x, y].map(|v| f64::from(v) * self.side);
-        let ground = tree.ground_bounds(low, low.map(|l| l + self.side));
+        self.bounds(tree, [x, y], [x + 1, y + 1])
+    }
+
+    /// Bounds of the trees of the quads from one to before another: crowns reach out of their quad, and up.
+    pub(super) fn bounds(&self, tree: &Quadtree, low: [i32; 2], high: [i32; 2]) -> Bounds {
+        let ground =
+            tree.ground_bounds(low.map(|v| f64::from(v) * self.side), high.map(|v| f64::from(v) * self.side));
         let margin = self.top;
         Bounds {
             low: [ground.low[0] - margin, ground.low[1] - margin, ground.low[2]],
@@ -221,7 +253,7 @@ impl SeedData {
             .map(|(bounds, quad)| (bounds.distance(eye.position), quad))
             .collect();
         beyond.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let room = (self.cache.capacity() as usize).saturating_sub(visible.len());
+        let room = ((self.cache.capacity() - self.spare) as usize).saturating_sub(visible.len());
         visible.extend(beyond.into_iter().take(room).map(|(_, quad)| quad));
         visible.sort_unstable_by_key(|(x, y)| (*y, *x));
     }
@@ -254,30 +286,32 @@ impl SeedData {
     pub fn produce(
         &self,
         recorder: &mut Recorder,
-        work: &SeedWork,
+        fresh: &[FreshSeeds],
         terrain: &TerrainData,
         species: &SpeciesData,
     ) {
-        if work.fresh.1 == 0 {
+        if fresh.iter().all(|(_, (_, count))| *count == 0) {
             return;
         }
         recorder.compute("seeds", |pass| {
-            pass.bind(
-                &self.program,
-                &[
-                    ("quads", Resource::Buffer(&self.quads)),
-                    ("pattern", Resource::Buffer(&self.pattern)),
-                    ("listed", Resource::Buffer(&self.listed)),
-                    ("species", Resource::Buffer(&species.table)),
-                    ("seeds", Resource::Buffer(&self.seeds)),
-                    ("draws", Resource::Buffer(&self.draws)),
-                    ("heights", Resource::Texture(&terrain.heights, Sampler::Nearest)),
-                    ("densities", Resource::Texture(&species.densities, Sampler::Nearest)),
-                    ("scene_size", Resource::Buffer(&self.species_count)),
-                ],
-            );
-            pass.push(&SeedParameters { first_quad: work.fresh.0, ..self.parameters });
-            pass.dispatch([work.fresh.1, 1, 1]);
+            for (quads, (first, count)) in fresh {
+                pass.bind(
+                    &self.program,
+                    &[
+                        ("quads", Resource::Buffer(quads)),
+                        ("pattern", Resource::Buffer(&self.pattern)),
+                        ("listed", Resource::Buffer(&self.listed)),
+                        ("species", Resource::Buffer(&species.table)),
+                        ("seeds", Resource::Buffer(&self.seeds)),
+                        ("draws", Resource::Buffer(&self.draws)),
+                        ("heights", Resource::Texture(&terrain.heights, Sampler::Nearest)),
+                        ("densities", Resource::Texture(&species.densities, Sampler::Nearest)),
+                        ("scene_size", Resource::Buffer(&self.species_count)),
+                    ],
+                );
+                pass.push(&SeedParameters { first_quad: *first, ..self.parameters });
+                pass.dispatch([*count, 1, 1]);
+            }
         });
     }
 }

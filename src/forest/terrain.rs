@@ -1,7 +1,7 @@
 //! Terrain tiles: heights and slopes of quads in texture arrays, least recently used first out.
 
 use super::cache::SlotCache;
-use crate::camera::{Cascade, Eye};
+use crate::camera::Eye;
 use crate::gpu::interface::{
     NO_PAGE, TERRAIN_CELLS, TERRAIN_HEIGHTS, TERRAIN_SLOPES, TerrainParameters, TerrainQuad,
 };
@@ -23,7 +23,7 @@ pub struct TerrainData {
     pub height_tiles: Image,
     /// Slopes of quads.
     pub slope_tiles: Image,
-    /// Quads of this frame: the camera's, each cascade's, then those to produce.
+    /// Quads of this frame: the camera's, then those to produce.
     pub quads: Buffer,
     cache: SlotCache<QuadKey>,
     /// What makes tiles; level ground has but the one that it begins with.
@@ -45,8 +45,6 @@ pub struct TerrainDraws {
     pub camera: (u32, u32),
     /// How many of them, the first, shadow cascades may reach.
     pub shadowed: u32,
-    /// The same for each cascade.
-    pub cascades: Vec<(u32, u32)>,
     /// The same for tiles to produce.
     pub fresh: (u32, u32),
 }
@@ -111,10 +109,10 @@ impl TerrainData {
             albedo,
             height_tiles,
             slope_tiles,
-            // Each quad once for the camera, once a cascade, once when fresh.
+            // Each quad once for the camera, once when fresh.
             quads: gpu.texel_buffer(
                 "terrain quads",
-                6 * u64::from(plan.terrain_tiles) * size_of::<TerrainQuad>() as u64,
+                2 * u64::from(plan.terrain_tiles) * size_of::<TerrainQuad>() as u64,
                 (vk::Format::R32G32B32A32_UINT, 16),
             )?,
             cache: SlotCache::new(plan.terrain_tiles),
@@ -144,11 +142,12 @@ impl TerrainData {
         }
     }
 
-    /// Selects this frame's quads; [`TerrainData::upload`] them when they have their coverage tiles.
+    /// Selects this frame's quads, with shadow cascades to `shadows` metres; [`TerrainData::upload`] them when they have their
+    /// coverage tiles.
     ///
     /// # Errors
     /// [`Error::Usage`] when the view needs more tiles than the plan holds even at the coarsest.
-    pub fn update(&mut self, eye: &Eye, cascades: &[Cascade], pixels: f64) -> Result<TerrainDraws> {
+    pub fn update(&mut self, eye: &Eye, shadows: f64, pixels: f64) -> Result<TerrainDraws> {
         let most = self.cache.capacity() as usize;
         let planes = eye.planes();
         let wanted = eye.pixels_at_1m / (f64::from(TERRAIN_CELLS) * pixels);
@@ -156,19 +155,13 @@ impl TerrainData {
         loop {
             self.refine = refine;
             let tree = &self.tree;
-            let select = |keep: &dyn Fn(&crate::land::quadtree::Bounds) -> bool| {
-                tree.select(eye.position, refine, most, keep)
-            };
-            let camera = select(&|b| b.touches(&planes, eye.position));
-            let shadows: Option<Vec<_>> =
-                cascades.iter().map(|c| select(&|b| b.touches(&c.planes, eye.position))).collect();
-            if let (Some(camera), Some(shadows)) = (camera, shadows) {
-                let (mut near, far): (Vec<_>, Vec<_>) = camera.into_iter().partition(|q| {
-                    cascades.last().is_some_and(|c| self.tree.nearest(*q, eye.position) <= c.far)
-                });
+            let camera = tree.select(eye.position, refine, most, &|b| b.touches(&planes, eye.position));
+            if let Some(camera) = camera {
+                let (mut near, far): (Vec<_>, Vec<_>) =
+                    camera.into_iter().partition(|q| self.tree.nearest(*q, eye.position) <= shadows);
                 let shadowed = near.len() as u32;
                 near.extend(far);
-                if let Some(draws) = self.assign(&near, &shadows) {
+                if let Some(draws) = self.assign(near) {
                     return Ok(TerrainDraws { shadowed, ..draws });
                 }
             }
@@ -182,43 +175,32 @@ impl TerrainData {
         }
     }
 
-    fn assign(&mut self, camera: &[QuadKey], shadows: &[Vec<QuadKey>]) -> Option<TerrainDraws> {
+    fn assign(&mut self, keys: Vec<QuadKey>) -> Option<TerrainDraws> {
         self.cache.begin_frame();
-        let (mut all, mut fresh) = (Vec::new(), Vec::new());
-        let mut draws = TerrainDraws { keys: camera.to_vec(), ..TerrainDraws::default() };
-        for (k, list) in std::iter::once(camera).chain(shadows.iter().map(Vec::as_slice)).enumerate() {
-            let first = all.len() as u32;
-            for key in list {
-                let Some(slot) = self.cache.slot(*key) else {
-                    self.cache = SlotCache::new(self.cache.capacity());
-                    return None;
-                };
-                let spacing = self.tree.spacing(key.level);
-                let corner = [key.x, key.y].map(|v| (v * TERRAIN_CELLS * spacing) as i32);
-                let quad = TerrainQuad {
-                    corner,
-                    spacing: spacing as i32,
-                    layer: if self.program.is_some() { slot.index } else { 0 },
-                    morph: self.tree.morph(key.level, self.refine).map(|m| m as f32),
-                    cover_layer: NO_PAGE,
-                    ..bytemuck::Zeroable::zeroed()
-                };
-                all.push(quad);
-                if slot.fresh && self.program.is_some() {
-                    fresh.push(quad);
-                }
-            }
-            let range = (first, all.len() as u32 - first);
-            if k == 0 {
-                draws.camera = range;
-            } else {
-                draws.cascades.push(range);
+        let (mut quads, mut fresh) = (Vec::new(), Vec::new());
+        for key in &keys {
+            let Some(slot) = self.cache.slot(*key) else {
+                self.cache = SlotCache::new(self.cache.capacity());
+                return None;
+            };
+            let spacing = self.tree.spacing(key.level);
+            let quad = TerrainQuad {
+                corner: [key.x, key.y].map(|v| (v * TERRAIN_CELLS * spacing) as i32),
+                spacing: spacing as i32,
+                layer: if self.program.is_some() { slot.index } else { 0 },
+                morph: self.tree.morph(key.level, self.refine).map(|m| m as f32),
+                cover_layer: NO_PAGE,
+                ..bytemuck::Zeroable::zeroed()
+            };
+            quads.push(quad);
+            if slot.fresh && self.program.is_some() {
+                fresh.push(quad);
             }
         }
-        draws.fresh = (all.len() as u32, fresh.len() as u32);
-        all.extend(fresh);
-        draws.quads = all;
-        Some(draws)
+        let count = quads.len() as u32;
+        let (camera, made) = ((0, count), (count, fresh.len() as u32));
+        quads.extend(fresh);
+        Some(TerrainDraws { quads, keys, camera, shadowed: 0, fresh: made })
     }
 
     /// Uploads the quads.

@@ -1,7 +1,6 @@
 //! The terrain pass.
 
 use super::Forest;
-use super::shadows::TerrainPush;
 use super::targets::ImageTargets;
 use super::trees::shader_map::{NODE_TEXELS, ShaderMap};
 use crate::Result;
@@ -135,14 +134,14 @@ impl Ground {
                 ("height_tiles", Resource::Texture(&terrain.height_tiles, Sampler::Nearest)),
                 ("slope_tiles", Resource::Texture(&terrain.slope_tiles, Sampler::Linear)),
                 ("albedo", Resource::Texture(&terrain.albedo, Sampler::Linear)),
-                ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+                ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
                 ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
                 ("nodes", Resource::Buffer(nodes)),
             ];
             let near = self.shadowed.iter().map(|p| (p, 0..draws.shadowed));
             for (program, quads) in near.chain([(&self.beyond, draws.shadowed..draws.camera.1)]) {
                 pass.bind(program, &resources);
-                pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
+                pass.push(&terrain.parameters(draws.camera.0));
                 pass.draw_indexed(indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, quads);
             }
         });

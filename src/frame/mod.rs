@@ -1,7 +1,10 @@
 //! A frame: every pass in order, in [`Renderer::render`].
 
 pub mod ground;
+pub mod pages;
+pub mod receivers;
 pub mod seen_ground;
+pub mod shadow_ground;
 pub mod shadows;
 pub mod sky;
 pub mod targets;
@@ -16,9 +19,10 @@ use tracing::info_span;
 use crate::bake::Baked;
 use crate::camera::{Cascade, Eye, Light};
 use crate::clock::{monotonic_ns, process_cpu_ms_since, process_cpu_ns};
+use crate::forest::casters::CasterData;
 use crate::forest::coverage::CoverageData;
 use crate::forest::cull::{CullData, TreeCounts};
-use crate::forest::seeds::SeedData;
+use crate::forest::seeds::{FreshSeeds, SeedData, SeedWork};
 use crate::forest::species::SpeciesData;
 use crate::forest::tables::TableData;
 use crate::forest::terrain::TerrainData;
@@ -30,7 +34,7 @@ use crate::scene::{Camera, Scene, Sun};
 use crate::{Error, Result};
 use ground::Ground;
 use seen_ground::SeenGround;
-use shadows::Shadows;
+use shadows::{CastingTrees, Shadows};
 use sky::SkyPass;
 use targets::ImageTargets;
 use tonemap::Tonemap;
@@ -52,10 +56,27 @@ pub struct Forest {
     pub near: Option<NearTrees>,
 }
 
+impl Forest {
+    /// The seeds to produce before anything is drawn: those that the camera sees, and of the first batch of casters.
+    fn fresh(&self, seen: &SeedWork) -> Vec<FreshSeeds<'_>> {
+        let casters = self.near.as_ref().and_then(|n| n.casters.as_ref());
+        let batch = casters.and_then(|c| c.work.batches.first().map(|b| c.fresh(b)));
+        std::iter::once((&self.seeds.quads, seen.fresh)).chain(batch).collect()
+    }
+
+    /// What draws the trees that cast.
+    fn casting(&self) -> Option<CastingTrees<'_>> {
+        let data = self.near.as_ref()?.casters.as_ref()?;
+        Some(CastingTrees { data, seeds: &self.seeds, species: &self.species })
+    }
+}
+
 /// Trees drawn one by one.
 pub struct NearTrees {
     /// Culling.
     pub cull: CullData,
+    /// What finds the trees that cast shadows, where there is a sun.
+    pub casters: Option<CasterData>,
     pass: TreePass,
 }
 
@@ -144,6 +165,7 @@ impl Renderer {
             let near = || -> Result<NearTrees> {
                 Ok(NearTrees {
                     cull: CullData::new(gpu, &scene, &plan, &tables)?,
+                    casters: (plan.cascades > 0).then(|| CasterData::new(gpu, &scene, &plan)).transpose()?,
                     pass: match plan.rasterizer {
                         Rasterizer::Graphics => {
                             TreePass::Graphics(Box::new(Trees::new(gpu, &scene, &plan, species.mask_rows)?))
@@ -243,6 +265,18 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::render`].
     pub fn draw(&mut self, eye: &Eye, cascades: &[Cascade], exposure: f64) -> Result<(FrameReport, View)> {
+        let drawn = self.draw_kept(eye, cascades, exposure);
+        if drawn.is_err() {
+            self.shadows.forget();
+            if let Some(forest) = &mut self.forest {
+                forest.seeds.forget();
+            }
+        }
+        drawn
+    }
+
+    /// Draws a frame that takes what the ones before left to be drawn.
+    fn draw_kept(&mut self, eye: &Eye, cascades: &[Cascade], exposure: f64) -> Result<(FrameReport, View)> {
         let _frame = info_span!("frame").entered();
         let (start_ns, cpu) = (monotonic_ns(), process_cpu_ns());
         let evicted = self.evicted();
@@ -255,18 +289,20 @@ impl Renderer {
                 plan.last_range()
             )));
         }
-        let sun = self.light.direction;
-        let [lowest, highest] = heights;
-
         // Stream: which quads, where in the caches, what is new.
         let streaming = info_span!("stream").entered();
         let pixels = f64::from(scene.settings.terrain_pixels);
-        let mut draws = self.terrain.update(eye, cascades, pixels)?;
+        let mut draws = self.terrain.update(eye, cascades.last().map_or(-1.0, |c| c.far), pixels)?;
+        let tree = &self.terrain.tree;
+        self.shadows.update(gpu, (scene, plan), tree, eye, cascades)?;
         let mut work = None;
         if let Some(forest) = &mut self.forest {
-            let sweep = shadow_sweep(sun, plan.cascades, plan.tallest + 0.25 * (highest - lowest));
-            let fresh = forest.seeds.update(gpu, scene, plan, &self.terrain.tree, eye, sweep)?;
-            work = Some((fresh, forest.coverage.update(gpu, &self.terrain.tree, &forest.seeds, &mut draws)?));
+            let seeds = forest.seeds.update(gpu, scene, plan, tree, eye)?;
+            let coverage = forest.coverage.update(gpu, tree, &forest.seeds, &mut draws)?;
+            if let Some(casters) = forest.near.as_mut().and_then(|n| n.casters.as_mut()) {
+                casters.update(gpu, &mut forest.seeds, tree, cascades, &self.shadows.work.blocks)?;
+            }
+            work = Some((seeds, coverage));
         }
         self.terrain.upload(gpu, &draws)?;
         let seeds = self.forest.as_ref().map(|f| &f.seeds);
@@ -280,8 +316,8 @@ impl Renderer {
         let mut recorder = gpu.record()?;
         recorder.stage("stream", |r| {
             self.terrain.produce(r, &draws);
-            if let (Some(forest), Some((fresh, tiles))) = (&self.forest, &work) {
-                forest.seeds.produce(r, fresh, &self.terrain, &forest.species);
+            if let (Some(forest), Some((seeds, tiles))) = (&self.forest, &work) {
+                forest.seeds.produce(r, &forest.fresh(seeds), &self.terrain, &forest.species);
                 forest.coverage.produce(r, tiles, &forest.seeds, &self.terrain, &forest.species);
             }
         });
@@ -291,9 +327,9 @@ impl Renderer {
                 cull.record(r, &self.view, seeds, species, tables, &self.terrain);
             });
         }
-        let trees = self.forest.as_ref().and_then(|f| Some((&f.near.as_ref()?.cull, &f.seeds, &f.species)));
+        let casting = self.forest.as_ref().and_then(Forest::casting);
+        self.shadows.record(&mut recorder, &self.view, &self.terrain, casting);
         let ground = (&self.terrain, &draws);
-        self.shadows.record(&mut recorder, &self.view, &self.terrain_indices, ground, trees);
         recorder.stage("image", |r| {
             if let Some(sky) = &self.sky {
                 sky.record(r, &self.view, &self.targets);
@@ -309,7 +345,7 @@ impl Renderer {
                 GroundPass::Drawn(pass) => {
                     let (view, indices) = (&self.view, &self.terrain_indices);
                     pass.record(r, view, indices, ground, forest, shadow_map, &self.targets, clear);
-                    if let Some((forest, NearTrees { cull, pass: TreePass::Graphics(trees) })) = near {
+                    if let Some((forest, NearTrees { cull, pass: TreePass::Graphics(trees), .. })) = near {
                         trees.record(r, view, forest, cull, shadow_map, &self.targets);
                     }
                 }
@@ -339,15 +375,7 @@ impl Renderer {
         let ms = |from: u64, to: u64| to.saturating_sub(from) as f64 * 1e-6;
         let after = self.evicted();
 
-        let trees = match &self.forest {
-            Some(Forest { seeds, near: Some(near), .. }) if seeds.visible > 0 => {
-                if let TreePass::Tiles(tiles) = &near.pass {
-                    tiles.check(gpu)?;
-                }
-                near.cull.counts(gpu, cascades.len())?
-            }
-            _ => TreeCounts::default(),
-        };
+        let trees = self.count_trees(cascades.len())?;
         let report = FrameReport {
             start_ns,
             stream_ms: ms(start_ns, record_ns),
@@ -355,7 +383,8 @@ impl Renderer {
             cpu_ms,
             produced: Tiles {
                 terrain: draws.fresh.1,
-                seeds: work.as_ref().map_or(0, |(seeds, _)| seeds.fresh.1),
+                seeds: work.as_ref().map_or(0, |(seeds, _)| seeds.fresh.1)
+                    + self.casters().map_or(0, CasterData::fresh_quads),
                 coverage: work.as_ref().map_or(0, |(_, coverage)| coverage.tiles),
             },
             // A cache that is made anew begins to count again.
@@ -370,6 +399,25 @@ impl Renderer {
             seed_quads: self.forest.as_ref().map_or(0, |f| f.seeds.visible),
         };
         Ok((report, view))
+    }
+
+    /// Reads how many trees a frame drew.
+    fn count_trees(&self, cascades: usize) -> Result<TreeCounts> {
+        let mut counts = TreeCounts::default();
+        let Some(Forest { seeds, near: Some(near), .. }) = &self.forest else { return Ok(counts) };
+        if let TreePass::Tiles(tiles) = &near.pass {
+            tiles.check(&self.gpu)?;
+        }
+        if seeds.visible > 0 {
+            counts.camera = near.cull.count(&self.gpu)?;
+        }
+        counts.cascades = vec![0; cascades];
+        if let Some(casters) = &near.casters {
+            for (block, count) in self.shadows.work.blocks.iter().zip(casters.counts(&self.gpu)?) {
+                counts.cascades[block.cascade] += count;
+            }
+        }
+        Ok(counts)
     }
 
     /// Tiles thrown out so far.
@@ -391,17 +439,18 @@ impl Renderer {
         self.targets.read(&self.gpu, &self.plan, self.light.scale)
     }
 
+    /// The shadow maps.
+    pub fn shadows(&self) -> &Shadows {
+        &self.shadows
+    }
+
+    /// What finds the trees that cast shadows.
+    pub fn casters(&self) -> Option<&CasterData> {
+        self.forest.as_ref()?.near.as_ref()?.casters.as_ref()
+    }
+
     /// The device that draws.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
     }
-}
-
-/// How far, and which way, a shadow of something `tall` reaches on level ground; at most twenty times its height.
-fn shadow_sweep(sun: [f64; 3], cascades: u32, tall: f64) -> [f64; 3] {
-    if cascades == 0 {
-        return [0.0; 3];
-    }
-    let length = tall / sun[2].max(0.05);
-    [-sun[0] * length, -sun[1] * length, -sun[2] * length]
 }

@@ -3,7 +3,6 @@
 
 use super::Forest;
 use super::ground::NoTrees;
-use super::shadows::TerrainPush;
 use super::targets::ImageTargets;
 use super::trees::shader_map::ShaderMap;
 use crate::Result;
@@ -82,7 +81,7 @@ impl SeenGround {
                     ("height_tiles", Resource::Texture(&terrain.height_tiles, Sampler::Nearest)),
                 ],
             );
-            pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
+            pass.push(&terrain.parameters(draws.camera.0));
             pass.draw_indexed(indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, 0..draws.camera.1);
         });
     }
@@ -108,7 +107,7 @@ impl SeenGround {
                 ("quads", Resource::Texels(&terrain.quads)),
                 ("slope_tiles", Resource::Texture(&terrain.slope_tiles, Sampler::Linear)),
                 ("albedo", Resource::Texture(&terrain.albedo, Sampler::Linear)),
-                ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+                ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
                 ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
                 ("nodes", Resource::Texels(nodes)),
                 // Without trees nothing of it is read.
@@ -117,7 +116,7 @@ impl SeenGround {
                 ("quads_seen", Resource::Texture(quads_seen.drawn(), Sampler::Nearest)),
             ];
             pass.bind(&self.light, &[&all[..], &more].concat());
-            pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
+            pass.push(&terrain.parameters(draws.camera.0));
             pass.dispatch([self.tiles[0], self.tiles[1], 1]);
         });
     }

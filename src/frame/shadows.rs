@@ -1,35 +1,77 @@
-//! All cascades in one layered pass: the terrain, then the trees' backs (BN12, section 5).
+//! All cascades in one layered pass: the terrain, then the trees' backs (BN12, section 5). What was drawn is kept: a frame draws
+//! the pages that it needs and the frames before did not.
 
+use super::pages::{Block, Held, blocks};
+use super::receivers;
+use super::shadow_ground::squares;
 use crate::Result;
-use crate::camera::{Cascade, Eye};
-use crate::forest::cull::CullData;
+use crate::camera::Eye;
+use crate::camera::cascades::{Cascade, cascades};
+use crate::forest::casters::{CasterData, DrawnBlock};
 use crate::forest::seeds::SeedData;
 use crate::forest::species::SpeciesData;
-use crate::forest::terrain::{TerrainData, TerrainDraws};
-use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand, TERRAIN_CELLS, TerrainParameters};
+use crate::forest::terrain::TerrainData;
+use crate::gpu::interface::{GroundCaster, SHADOW_CELLS, SHADOW_PAGES, ShadowBlock};
 use crate::gpu::{
-    Attachment, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler,
-    Targets, shaders, vk,
+    Attachment, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, RenderPass,
+    Resource, Sampler, Targets, shaders, vk,
 };
+use crate::land::quadtree::Quadtree;
 use crate::plan::Plan;
 use crate::scene::Scene;
 
-/// Push constants of a terrain draw.
+/// Push constants of a draw of ground.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct TerrainPush {
-    /// Parameters of the terrain.
-    pub parameters: TerrainParameters,
-    /// Cascade drawn to.
-    pub cascade: u32,
+struct GroundPush {
+    block: ShadowBlock,
+    /// North-east corner of the terrain on its finest grid.
+    last: [f32; 2],
+    /// Metres a step of it.
+    step: f32,
+    /// Height map texels a step of it.
+    texels_per_step: f32,
 }
 
 /// Shadow maps and the programs that draw them.
 pub struct Shadows {
-    /// Depth of the caster nearest the sun, one layer a cascade.
+    /// Depth of the caster nearest the sun, one layer a cascade; it repeats.
     pub map: Image,
-    /// For the terrain, and for trees if any are drawn by themselves.
-    programs: Option<(Program, Option<Program>)>,
+    /// What this frame draws.
+    pub work: ShadowWork,
+    held: Held,
+    blocks: Buffer,
+    sums: Buffer,
+    squares: Buffer,
+    /// Indices of a square's mesh.
+    indices: Buffer,
+    programs: Programs,
+}
+
+/// What draws: without relief no ground, and trees if any are drawn by themselves.
+struct Programs {
+    ground: Option<Program>,
+    trees: Option<Program>,
+}
+
+/// What a frame draws.
+#[derive(Clone, Debug, Default)]
+pub struct ShadowWork {
+    /// Blocks with pages to draw.
+    pub blocks: Vec<DrawnBlock>,
+    /// First and number of each block's squares of ground.
+    pub ground: Vec<(u32, u32)>,
+}
+
+/// What casts besides the ground.
+#[derive(Clone, Copy)]
+pub struct CastingTrees<'a> {
+    /// Where they are found.
+    pub data: &'a CasterData,
+    /// Their seeds.
+    pub seeds: &'a SeedData,
+    /// Their species.
+    pub species: &'a SpeciesData,
 }
 
 impl Shadows {
@@ -39,46 +81,44 @@ impl Shadows {
     /// [`crate::Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
         let on = plan.cascades > 0;
-        let side = if on { scene.settings.cascade_size } else { 1 };
-        let layers = plan.cascades.max(1);
         let map = gpu.image(&ImageDesc {
             name: "shadow cascades",
             format: vk::Format::D32_SFLOAT,
-            size: [side; 2],
-            layers,
+            size: [if on { scene.settings.cascade_size } else { 1 }; 2],
+            layers: plan.cascades.max(1),
             levels: 1,
             samples: 1,
             usage: vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
         })?;
         let program = |vert, frag, constants| {
-            gpu.graphics(&GraphicsDesc {
-                vert,
-                frag,
-                colors: &[],
-                samples: 1,
-                depth: DepthTest::Reverse,
-                constants,
-            })
+            let depth = DepthTest::Reverse;
+            gpu.graphics(&GraphicsDesc { vert, frag, colors: &[], samples: 1, depth, constants })
         };
         let s = &scene.settings;
         let views = [("VIEW_RINGS", s.view_rings), ("VIEW_RESOLUTION", (s.view_resolution as f32).to_bits())];
-        if !on {
-            return Ok(Shadows { map, programs: None });
-        }
+        // Level ground shades nothing.
+        let ground = (on && scene.terrain.heights.is_some())
+            .then(|| program(&shaders::FRAME_TERRAIN_SHADOW_VERT, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[]));
+        let trees = (on && plan.z_fields).then(|| {
+            program(
+                &shaders::FRAME_TREES_ZFIELD_SHADOW_VERT,
+                &shaders::FRAME_TREES_ZFIELD_SHADOW_FRAG,
+                &views,
+            )
+        });
+        let side = SHADOW_CELLS + 1;
+        let cells = (0..SHADOW_CELLS * SHADOW_CELLS).map(|k| k % SHADOW_CELLS + side * (k / SHADOW_CELLS));
+        let indices: Vec<u32> =
+            cells.flat_map(|k| [k, k + 1, k + side + 1, k, k + side + 1, k + side]).collect();
         Ok(Shadows {
             map,
-            programs: Some((
-                program(&shaders::FRAME_TERRAIN_SHADOW_VERT, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[])?,
-                plan.z_fields
-                    .then(|| {
-                        program(
-                            &shaders::FRAME_TREES_ZFIELD_SHADOW_VERT,
-                            &shaders::FRAME_TREES_ZFIELD_SHADOW_FRAG,
-                            &views,
-                        )
-                    })
-                    .transpose()?,
-            )),
+            work: ShadowWork::default(),
+            held: Held::default(),
+            blocks: gpu.buffer("shadow blocks", 16 * size_of::<ShadowBlock>() as u64)?,
+            sums: gpu.buffer("shadow page sums", 0)?,
+            squares: gpu.buffer("casting ground", 1024 * size_of::<GroundCaster>() as u64)?,
+            indices: gpu.buffer_with("casting ground indices", &indices)?,
+            programs: Programs { ground: ground.transpose()?, trees: trees.transpose()? },
         })
     }
 
@@ -87,67 +127,190 @@ impl Shadows {
         if plan.cascades == 0 {
             return Vec::new();
         }
-        // Nothing is nearer than the highest treetop is below the eye.
-        let clear = (eye.position[2] - highest).clamp(0.0, 0.5 * plan.shadow_distance);
-        let near = (0.02 * plan.shadow_distance).min(5.0).max(clear);
         let s = &scene.settings;
+        let near = (0.02 * plan.shadow_distance).min(5.0);
+        // Nothing is nearer than the highest treetop is below the eye. In steps of factors of two: where cascades begin decides how
+        // large their texels are, and all has to be drawn anew when those change.
+        let clear = (eye.position[2] - highest).clamp(0.0, 0.5 * plan.shadow_distance);
+        let clear = if clear > near { clear.log2().floor().exp2().max(near) } else { 0.0 };
         let (count, split) = (plan.cascades, f64::from(s.cascade_split));
-        crate::camera::cascades::cascades(
-            eye,
-            sun,
-            (clear, near, plan.shadow_distance),
-            count,
-            split,
-            s.cascade_size,
-        )
+        cascades(eye, sun, (clear, near.max(clear), plan.shadow_distance), count, split, s.cascade_size)
     }
 
-    /// Records the pass.
+    /// Which pages of the cascades an eye needs that are not there; from now on they are taken to be, until
+    /// [`Shadows::forget`].
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the device fails.
+    pub fn update(
+        &mut self,
+        gpu: &Gpu,
+        (scene, plan): (&Scene, &Plan),
+        tree: &Quadtree,
+        eye: &Eye,
+        cascades: &[Cascade],
+    ) -> Result<()> {
+        let needed = receivers::needed(tree, eye, cascades, if plan.z_fields { plan.tallest } else { 0.0 });
+        let fresh = self.held.take(cascades, &needed);
+        let [lowest, highest] = tree.total_range();
+        let (mut work, mut sums) = (ShadowWork::default(), Vec::new());
+        for (k, (cascade, pages)) in cascades.iter().zip(&fresh).enumerate() {
+            for (block, pages) in blocks(cascade, pages) {
+                let gpu = shader_block(cascade, k, &block, 0.5 * (lowest + highest), sums.len());
+                work.blocks.push(DrawnBlock { cascade: k, block, pages, gpu });
+            }
+            if !pages.is_empty() {
+                sums.extend(pages.sums());
+            }
+        }
+        if work.blocks.is_empty() {
+            self.work = work;
+            return Ok(());
+        }
+        let on_gpu: Vec<ShadowBlock> = work.blocks.iter().map(|b| b.gpu).collect();
+        gpu.renew(&mut self.blocks, "shadow blocks", &on_gpu)?;
+        gpu.renew(&mut self.sums, "shadow page sums", &sums)?;
+        if self.programs.ground.is_some() {
+            let pixels = f64::from(scene.settings.terrain_pixels);
+            let (all, ranges) = squares(tree, cascades, &work.blocks, pixels);
+            gpu.renew(&mut self.squares, "casting ground", &all)?;
+            work.ground = ranges;
+        }
+        self.work = work;
+        Ok(())
+    }
+
+    /// What was to be drawn may not have been: all is drawn anew.
+    pub fn forget(&mut self) {
+        self.held = Held::default();
+    }
+
+    /// Records the passes.
     pub fn record(
         &self,
         recorder: &mut Recorder,
         view: &Buffer,
-        indices: &Buffer,
-        (terrain, draws): (&TerrainData, &TerrainDraws),
-        trees: Option<(&CullData, &SeedData, &SpeciesData)>,
+        terrain: &TerrainData,
+        trees: Option<CastingTrees>,
     ) {
-        let Some((ground, tree)) = &self.programs else { return };
+        let work = &self.work;
+        if self.map.size() == [1; 2] {
+            return;
+        }
         let targets = Targets {
             colors: &[],
-            depth: Some(Attachment { image: &self.map, resolve: None, clear: Some([0.0; 4]) }),
+            depth: Some(Attachment { image: &self.map, resolve: None, clear: None }),
             layers: self.map.layers(),
         };
-        recorder.render("shadows", &targets, |pass| {
-            pass.bind(
-                ground,
-                &[
-                    ("view", Resource::Buffer(view)),
-                    ("quads", Resource::Buffer(&terrain.quads)),
-                    ("height_tiles", Resource::Texture(&terrain.height_tiles, Sampler::Nearest)),
-                ],
-            );
-            for (c, (first, count)) in draws.cascades.iter().enumerate() {
-                let parameters = terrain.parameters(*first);
-                pass.push(&TerrainPush { parameters, cascade: c as u32 });
-                pass.draw_indexed(indices, 6 * TERRAIN_CELLS * TERRAIN_CELLS, 0..*count);
+        let batches = trees.map_or(0, |t| t.data.work.batches.len());
+        for batch in 0..batches.max(1) {
+            if let Some(t) = trees.filter(|_| !work.blocks.is_empty()) {
+                // Seeds of the first batch are produced with those that the camera sees.
+                if let Some(b) = t.data.work.batches.get(batch).filter(|_| batch > 0) {
+                    t.seeds.produce(recorder, &[t.data.fresh(b)], terrain, t.species);
+                }
+                let buffers = (&self.blocks, &self.sums);
+                t.data.record(recorder, view, buffers, t.seeds, t.species, batch);
             }
-            let Some((tree, (cull, seeds, species))) = tree.as_ref().zip(trees) else { return };
-            pass.bind(
-                tree,
-                &[
-                    ("view", Resource::Buffer(view)),
-                    ("trees", Resource::Buffer(&cull.trees)),
-                    ("lists", Resource::Buffer(&cull.lists)),
-                    ("species", Resource::Buffer(&species.table)),
-                    ("bases", Resource::Buffer(&species.bases)),
-                    ("views", Resource::Texture(&species.views, Sampler::LinearBorder)),
-                ],
-            );
-            for c in 0..self.map.layers() {
-                pass.push(&c);
-                let command = u64::from(CAMERA_DRAWS + c) * size_of::<DrawCommand>() as u64;
-                pass.draw_indexed_indirect(&seeds.quad_indices, &cull.commands, command);
+            recorder.render("shadows", &targets, |pass| {
+                if batch == 0 {
+                    self.draw_ground(pass, terrain, work);
+                }
+                if let (Some(program), Some(t)) = (&self.programs.trees, trees) {
+                    self.draw_trees(pass, program, view, work, t, batch);
+                }
+            });
+        }
+    }
+
+    /// Clears the pages, and draws the ground.
+    fn draw_ground(&self, pass: &mut RenderPass, terrain: &TerrainData, work: &ShadowWork) {
+        for b in &work.blocks {
+            let page = self.page();
+            let texel = |at: usize, shift: i64| (at as i64 - shift) as u32 * page;
+            for [low, high] in b.pages.rectangles() {
+                let [low, high] = [low, high].map(|p| [0, 1].map(|k| texel(p[k], b.block.shift[k])));
+                pass.clear_depth([low, high], b.cascade as u32, 0.0);
             }
-        });
+        }
+        let Some(ground) = &self.programs.ground else { return };
+        if work.blocks.is_empty() {
+            return;
+        }
+        pass.bind(
+            ground,
+            &[
+                ("squares", Resource::Buffer(&self.squares)),
+                ("heights", Resource::Texture(&terrain.heights, Sampler::Nearest)),
+            ],
+        );
+        let p = terrain.parameters(0);
+        for (b, (first, count)) in work.blocks.iter().zip(&work.ground) {
+            self.scissor(pass, b);
+            let (last, step, texels_per_step) = (p.last, p.step, p.texels_per_step);
+            pass.push(&GroundPush { block: b.gpu, last, step, texels_per_step });
+            pass.draw_indexed(&self.indices, 6 * SHADOW_CELLS * SHADOW_CELLS, *first..*first + *count);
+        }
+    }
+
+    fn draw_trees(
+        &self,
+        pass: &mut RenderPass,
+        program: &Program,
+        view: &Buffer,
+        work: &ShadowWork,
+        trees: CastingTrees,
+        batch: usize,
+    ) {
+        let Some(b) = trees.data.work.batches.get(batch) else { return };
+        pass.bind(
+            program,
+            &[
+                ("view", Resource::Buffer(view)),
+                ("casters", Resource::Buffer(&trees.data.casters)),
+                ("species", Resource::Buffer(&trees.species.table)),
+                ("bases", Resource::Buffer(&trees.species.bases)),
+                ("views", Resource::Texture(&trees.species.views, Sampler::LinearBorder)),
+            ],
+        );
+        for block in &b.blocks {
+            let drawn = &work.blocks[*block];
+            self.scissor(pass, drawn);
+            pass.push(&drawn.gpu);
+            let command = trees.data.work.command(batch, *block);
+            pass.draw_indexed_indirect(&trees.seeds.quad_indices, &trees.data.commands, command);
+        }
+    }
+
+    /// What lies beyond a block in its image belongs to others.
+    fn scissor(&self, pass: &mut RenderPass, b: &DrawnBlock) {
+        let texels = |pages: [i64; 2]| pages.map(|p| p as u32 * self.page());
+        pass.scissor([texels(b.block.first), texels(b.block.last)]);
+    }
+
+    /// Texels along a page.
+    fn page(&self) -> u32 {
+        self.map.size()[0] / SHADOW_PAGES
+    }
+}
+
+/// A block as shaders take it; `ground` is the height that corners refer to, m, and `sums` where its cascade's sums begin.
+fn shader_block(cascade: &Cascade, k: usize, b: &Block, ground: f64, sums: usize) -> ShadowBlock {
+    let g = &cascade.grid;
+    let axis = |k: usize, scale: f64| g.axes[k].map(|v| (v / scale) as f32);
+    let row = i64::from(SHADOW_PAGES) + 1;
+    ShadowBlock {
+        x: axis(0, g.texel),
+        y: axis(1, g.texel),
+        z: axis(2, g.depth()),
+        cascade: k as u32,
+        to_clip: 2.0 / g.texels as f32,
+        ground: ground as f32,
+        first: b.first.map(|v| v as i32),
+        last: b.last.map(|v| v as i32),
+        sums: (sums as i64 + b.shift[1] * row + b.shift[0]) as i32,
+        texels_per_metre: (1.0 / g.texel) as f32,
+        pages_per_texel: 1.0 / g.page() as f32,
+        depth_per_metre: (1.0 / g.depth()) as f32,
     }
 }

@@ -30,13 +30,13 @@ pub fn view(
         *p = planes.get(k).map_or([0.0, 0.0, 0.0, 1e30], |p| p.map(|v| v as f32));
     }
     for (c, cascade) in cascades.iter().enumerate() {
-        view.cascade_from_world[c] = matrix(cascade.matrix());
-        for k in 0..3 {
-            let a = cascade.axes[k].map(|v| v as f32);
-            view.cascade_planes[3 * c + k] = [a[0], a[1], a[2], cascade.half as f32];
-            view.cascade_centres[c][k] = -cascade.centre[k] as f32;
-        }
-        view.cascade_texel[c] = cascade.texel as f32;
+        let grid = &cascade.grid;
+        view.cascade_from_world[c] = matrix(cascade.matrix(eye));
+        // The map repeats.
+        let turn = cascade.first.map(|f| f.rem_euclid(i64::from(grid.texels)) as f32);
+        view.cascade_turn[c] = [turn[0], turn[1], 0.0, 0.0];
+        (view.cascade_x, view.cascade_y) = (grid.axes[0].map(|v| v as f32), grid.axes[1].map(|v| v as f32));
+        view.cascade_texel[c] = grid.texel as f32;
         view.cascade_far[c] = cascade.far as f32;
     }
     for k in 0..DISTANCE_BINS as usize {

@@ -14,6 +14,8 @@ use crate::{Error, Result};
 pub enum Sampler {
     /// No filtering; clamps to the edge.
     Nearest,
+    /// No filtering; repeats.
+    NearestRepeat,
     /// Bilinear within the nearest mip level; clamps to the edge.
     Linear,
     /// Bilinear within the nearest mip level; transparent black outside.
@@ -25,14 +27,23 @@ pub enum Sampler {
 }
 
 impl Sampler {
-    pub(super) const ALL: [Sampler; 5] =
-        [Sampler::Nearest, Sampler::Linear, Sampler::LinearBorder, Sampler::LinearRepeat, Sampler::Trilinear];
+    pub(super) const ALL: [Sampler; 6] = [
+        Sampler::Nearest,
+        Sampler::NearestRepeat,
+        Sampler::Linear,
+        Sampler::LinearBorder,
+        Sampler::LinearRepeat,
+        Sampler::Trilinear,
+    ];
 
     pub(super) fn make(self, device: &ash::Device) -> std::result::Result<vk::Sampler, vk::Result> {
-        let filter = if self == Sampler::Nearest { vk::Filter::NEAREST } else { vk::Filter::LINEAR };
+        let filter = match self {
+            Sampler::Nearest | Sampler::NearestRepeat => vk::Filter::NEAREST,
+            _ => vk::Filter::LINEAR,
+        };
         let address = match self {
             Sampler::LinearBorder => vk::SamplerAddressMode::CLAMP_TO_BORDER,
-            Sampler::LinearRepeat => vk::SamplerAddressMode::REPEAT,
+            Sampler::LinearRepeat | Sampler::NearestRepeat => vk::SamplerAddressMode::REPEAT,
             _ => vk::SamplerAddressMode::CLAMP_TO_EDGE,
         };
         let create = vk::SamplerCreateInfo::default()

@@ -579,6 +579,26 @@ impl ComputePass<'_, '_> {
 }
 
 impl RenderPass<'_, '_> {
+    /// Draws only to a rectangle from now on: its first texel and the one beyond its last.
+    pub fn scissor(&mut self, rectangle: [[u32; 2]; 2]) {
+        let r = &*self.work.recorder;
+        // SAFETY: rendering was begun.
+        unsafe { r.device().cmd_set_scissor(r.cmd, 0, &[rect(rectangle)]) };
+    }
+
+    /// Sets the depth of a rectangle of a layer: of its first texel to before the one beyond its last.
+    pub fn clear_depth(&mut self, rectangle: [[u32; 2]; 2], layer: u32, depth: f32) {
+        let r = &*self.work.recorder;
+        let value = [vk::ClearAttachment {
+            aspect_mask: vk::ImageAspectFlags::DEPTH,
+            color_attachment: 0,
+            clear_value: vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth, stencil: 0 } },
+        }];
+        let area = [vk::ClearRect { rect: rect(rectangle), base_array_layer: layer, layer_count: 1 }];
+        // SAFETY: rendering was begun; the caller keeps the rectangle and the layer within its targets.
+        unsafe { r.device().cmd_clear_attachments(r.cmd, &value, &area) };
+    }
+
     /// Draws `vertices` vertices without an index buffer.
     pub fn draw(&mut self, vertices: u32, instances: u32) {
         let r = &mut *self.work.recorder;
@@ -611,6 +631,16 @@ impl RenderPass<'_, '_> {
             let number = instances.end - instances.start;
             r.device().cmd_draw_indexed(r.cmd, count, number, 0, 0, instances.start);
         }
+    }
+}
+
+fn rect([low, high]: [[u32; 2]; 2]) -> vk::Rect2D {
+    vk::Rect2D {
+        offset: vk::Offset2D { x: low[0] as i32, y: low[1] as i32 },
+        extent: vk::Extent2D {
+            width: high[0].saturating_sub(low[0]),
+            height: high[1].saturating_sub(low[1]),
+        },
     }
 }
 

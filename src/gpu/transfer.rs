@@ -39,6 +39,18 @@ impl Gpu {
         })
     }
 
+    /// Writes `content` into `buffer`, which is made anew when that is too short, and waits.
+    ///
+    /// # Errors
+    /// As [`Gpu::buffer`] and [`Gpu::upload`].
+    pub fn renew<T: Pod>(&self, buffer: &mut Buffer, name: &str, content: &[T]) -> Result<()> {
+        let bytes = size_of_val(content) as u64;
+        if bytes > buffer.bytes() {
+            *buffer = self.buffer(name, bytes.next_power_of_two())?;
+        }
+        self.upload(buffer, 0, content)
+    }
+
     /// Writes one mip level of all layers (or of `layers` from `first` on; of a volume, all slices of its only layer), rows
     /// tightly packed, and waits.
     ///

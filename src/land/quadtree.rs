@@ -46,6 +46,12 @@ impl Bounds {
         (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
     }
 
+    /// Distance of its farthest corner from a point.
+    pub fn farthest(&self, p: [f64; 3]) -> f64 {
+        let d = [0, 1, 2].map(|k| (self.high[k] - p[k]).abs().max((self.low[k] - p[k]).abs()));
+        (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
+    }
+
     /// Whether any of it is on the inner side of every plane (n, d), n·p + d ≥ 0 inside, for points from `eye`.
     pub fn touches(&self, planes: &[[f64; 4]], eye: [f64; 3]) -> bool {
         planes.iter().all(|n| {
@@ -78,6 +84,11 @@ impl Quadtree {
             cell_size: terrain.cell_size,
             pyramid: terrain.heights.as_ref().map_or_else(Vec::new, min_max_pyramid),
         }
+    }
+
+    /// Extent of the terrain, m.
+    pub fn extent(&self) -> [f64; 2] {
+        self.extent
     }
 
     /// Metres a step of the finest grid.
@@ -193,6 +204,29 @@ impl Quadtree {
     }
 }
 
+/// The cells of a grid that `keep` keeps, row after row; it is asked about rectangles of cells, from a corner to beyond the other.
+pub fn grid_cells(count: [u32; 2], keep: &dyn Fn([u32; 2], [u32; 2]) -> bool) -> Vec<[u32; 2]> {
+    let mut found = Vec::new();
+    let mut open = vec![([0, 0], count)];
+    while let Some((low, high)) = open.pop() {
+        if (0..2).any(|k| low[k] >= high[k]) || !keep(low, high) {
+            continue;
+        }
+        let size = [0, 1].map(|k| high[k] - low[k]);
+        if size == [1, 1] {
+            found.push(low);
+            continue;
+        }
+        let k = usize::from(size[1] > size[0]);
+        let middle = low[k] + size[k] / 2;
+        let (mut first, mut second) = (high, low);
+        (first[k], second[k]) = (middle, middle);
+        open.extend([(low, first), (second, high)]);
+    }
+    found.sort_unstable_by_key(|[x, y]| (*y, *x));
+    found
+}
+
 /// Metres a step of the finest grid, and the number of levels.
 fn levels(terrain: &Terrain, plain_side: f64) -> (f64, u32) {
     let largest = terrain.extent[0].max(terrain.extent[1]);
@@ -294,6 +328,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn cells_are_found_as_if_each_were_asked() {
+        let wanted = |x: u32, y: u32| (x * 7 + y * 3) % 11 == 0 || (x == 36 && y == 4);
+        let keep = |low: [u32; 2], high: [u32; 2]| {
+            (low[1]..high[1]).any(|y| (low[0]..high[0]).any(|x| wanted(x, y)))
+        };
+        let all = (0..5).flat_map(|y| (0..37).map(move |x| [x, y]));
+        let want: Vec<_> = all.filter(|[x, y]| wanted(*x, *y)).collect();
+        assert_eq!(grid_cells([37, 5], &keep), want);
     }
 
     #[test]

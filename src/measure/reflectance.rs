@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use crate::bake::Baked;
-use crate::camera::{Cascade, Eye};
+use crate::camera::{Cascade, Eye, cascades};
 use crate::frame::Renderer;
 use crate::gpu::Gpu;
 use crate::physics::raster::Raster;
@@ -189,10 +189,11 @@ pub fn measure(
     // Of one view: what the image shows, along the ground, and the trees around whose shadows fall into it.
     let span = |view: &[f64; 2]| 2.0 * (shown(*view, request.slope, method.side) + 2.0 * scene_plan.tallest);
     let widest = request.views.iter().map(span).fold(0.0, f64::max);
-    let texels = (widest / finest).clamp(64.0, LARGEST_SHADOW_MAP);
+    let texels = (f64::from(cascades::map_for(widest / finest))).clamp(64.0, LARGEST_SHADOW_MAP);
     patch.settings.cascades = 1;
-    patch.settings.cascade_size = (texels as u32).next_power_of_two();
-    let texel = |view: &[f64; 2]| finest.max(span(view) / f64::from(patch.settings.cascade_size));
+    patch.settings.cascade_size = texels as u32;
+    let texel =
+        |view: &[f64; 2]| finest.max(span(view) / f64::from(cascades::held(patch.settings.cascade_size)));
     let texels: Vec<f64> = request.views.iter().map(texel).collect();
     let patch = Arc::new(patch);
     let centres = centres(method.patches, request.slope);
@@ -208,12 +209,12 @@ pub fn measure(
         let mut samples = Vec::new();
         for centre in &centres {
             let eye = eye(*view, *centre);
-            let cascades = if renderer.plan().cascades > 0 {
+            let shadows = if renderer.plan().cascades > 0 {
                 vec![cascade(&patch, &eye, away, texel)]
             } else {
                 Vec::new()
             };
-            renderer.draw(&eye, &cascades, 1.0)?;
+            renderer.draw(&eye, &shadows, 1.0)?;
             samples.push(mean(&renderer)?);
             progress();
         }
@@ -300,14 +301,14 @@ fn shadow_texel(scene: &Scene, plan: &Plan, eye: &Eye, distance: f64) -> f64 {
     use crate::frame::shadows::Shadows;
     let cascades =
         Shadows::cascades(scene, plan, eye, crate::camera::sun_direction(&scene.sun), eye.position[2]);
-    cascades.iter().find(|c| distance <= c.far).or(cascades.last()).map_or(1.0, |c| c.texel)
+    cascades.iter().find(|c| distance <= c.far).or(cascades.last()).map_or(1.0, |c| c.grid.texel)
 }
 
 /// One cascade around the patch.
 fn cascade(scene: &Scene, eye: &Eye, away: f64, texel: f64) -> Cascade {
-    let half = 0.5 * texel * f64::from(scene.settings.cascade_size);
     let target = std::array::from_fn(|k| away * eye.forward[k]);
-    Cascade::around(crate::camera::sun_direction(&scene.sun), eye, target, half, texel, 2.0 * away)
+    let sun = crate::camera::sun_direction(&scene.sun);
+    Cascade::around(sun, eye, target, texel, scene.settings.cascade_size, 2.0 * away)
 }
 
 /// Mean of an image: fractions, sun and sky part.

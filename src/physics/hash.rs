@@ -17,6 +17,8 @@ pub fn unit(h: u32) -> f32 {
     (h >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
+/// Purpose of a tree's random number: how its opacity rounds to samples and shadows.
+pub const HASH_DITHER: u32 = 0x7feb_352d;
 /// Purpose of a tree's random number: when it fades.
 pub const HASH_FADE: u32 = 0x846c_a68b;
 

@@ -3,6 +3,7 @@
 #[path = "../common/device.rs"]
 mod device;
 
+mod casters;
 mod coverage;
 mod cull;
 mod determinism;
@@ -18,6 +19,7 @@ mod plan;
 mod program;
 mod seeds;
 mod shader_map;
+mod shadows_kept;
 mod silhouettes;
 mod soak;
 mod tables;

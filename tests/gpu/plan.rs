@@ -115,9 +115,14 @@ fn without_a_sun_there_are_no_shadows() {
         scene.sun.irradiance = [irradiance; 3];
         let night = draw(&gpu, &scene);
         assert!(!night.has("shadow cascades") && !night.draws("shadows"));
-        for shader in ["frame/terrain_shadow.frag", "frame/trees/zfield_shadow.frag"] {
+        for shader in ["forest/casters.comp", "frame/trees/zfield_shadow.frag"] {
             assert!(day.builds(shader) && !night.builds(shader), "{shader}: {:?}", night.pipelines);
         }
+        assert!(!day.builds("frame/terrain_shadow.frag"), "level ground shades nothing");
+        let mut relief = scene.clone();
+        relief.sun = self::scene().sun;
+        hills(&mut relief);
+        assert!(draw(&gpu, &relief).builds("frame/terrain_shadow.frag"));
         // One texel stands for the map that nobody reads.
         assert!(night.bytes("shadow cascades") < 1 << 16 && night.bytes("shadow depth") == 0);
         assert!(night.planned < day.planned);

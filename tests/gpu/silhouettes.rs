@@ -52,7 +52,7 @@ fn trees(gpu: &Gpu, renderer: &mut Renderer, eye: &Eye) -> (Vec<Tree>, View) {
     let (report, view) = renderer.render_eye(eye, 1.0).unwrap();
     let cull = &renderer.forest().unwrap().near.as_ref().unwrap().cull;
     let list: Vec<u32> = gpu.read(&cull.lists, 0, report.trees.camera as usize).unwrap();
-    let all: Vec<Tree> = gpu.read(&cull.trees, 0, report.trees.records as usize).unwrap();
+    let all: Vec<Tree> = gpu.read(&cull.trees, 0, report.trees.camera as usize).unwrap();
     (list.iter().map(|k| all[*k as usize]).collect(), view)
 }
 

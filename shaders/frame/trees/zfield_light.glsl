@@ -27,6 +27,7 @@ struct LightRay {
     vec3 weights;
     vec3 entry;         // the point in its cascade
     float deeper;       // change of the depth there a metre towards the sun
+    vec2 turn;          // texel of the shadow map where the cascade's first one is
 };
 
 // What is asked of the light.
@@ -75,8 +76,8 @@ TreeParts tree_light(sampler2DArray views, sampler2DArray shadow_map, sampler2DA
         float through = self_shadow(t.leaf, t.extinction, metres);
         vec3 entry = ray.entry;
         entry.z += metres * ray.deeper;
-        float visible = sun_visibility(shadow_map, entry, vec2(0.0), min(t.cascade, 3u));
-        through *= t.cascade < 4u ? visible : 1.0;
+        float visible = sun_visibility(shadow_map, entry, vec2(0.0), ray.turn, min(t.cascade, MAX_CASCADES - 1u));
+        through *= t.cascade < MAX_CASCADES ? visible : 1.0;
         float reached = through;
         // From below, views show the other side.
         if (quality.bands > 0u && !below) {

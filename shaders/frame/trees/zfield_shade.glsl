@@ -25,6 +25,7 @@ layout(location = 24) flat in vec4 mean_sun;
 layout(location = 25) flat in vec4 mean_sky;
 layout(location = 26) flat in vec4 sun_from; // in the tree's own axes; w: strength of light transfer
 
+layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 6) uniform sampler2DArray views;
 layout(binding = 7) uniform sampler2DArray shadow_map;
 layout(binding = 8) uniform sampler2DArray transfer_1;
@@ -70,6 +71,7 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
     ray.weights = vec3(weights.zw, 1.0 - weights.z - weights.w);
     ray.entry = mix(shadow_p, shadow_c.xyz, s);
     ray.deeper = shadow_c.w;
+    ray.turn = view.v.cascade_turn[min(tree_bits.w & 15u, MAX_CASCADES - 1u)].xy;
     TreeLight tree = TreeLight(sun.rgb, sky.rgb, mean_sun.rgb, mean_sky.rgb, mean_sky.w, mean_sun.w, bark_ratio.rgb, bark_ratio.w, sky.w,
                                sun.w, own.y, optics.y, sun_from.xyz, sun_from.w, tree_bits.w & 15u);
     TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, tree, at, p, d, layers, below, optics.x, MAGNIFIED, s,

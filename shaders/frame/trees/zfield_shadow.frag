@@ -9,7 +9,7 @@
 layout(location = 0) in vec3 light_p[3];
 layout(location = 3) in float depth;
 layout(location = 4) flat in vec4 light_d[3];
-layout(location = 7) flat in vec4 optics;
+layout(location = 7) flat in vec3 optics;
 layout(location = 8) flat in float depth_per_metre;
 layout(location = 9) flat in uint dither;
 layout(binding = 5) uniform sampler2DArray views;
@@ -23,8 +23,8 @@ void main() {
     vec3 layers = vec3(light_d[0].w, light_d[1].w, light_d[2].w);
     vec3 w = vec3(optics.xy, 1.0 - optics.x - optics.y);
     Surface back = zfield_fetch(views, p, d, 1.0 / vec3(d[0].z, d[1].z, d[2].z), layers, w, optics.z, 0.0, true, false);
-    // Texels side by side get dithers far apart: steps of the plastic number's powers (Roberts 2018, "R2 sequence").
+    // The map is world-fixed, and so is what is drawn to it. Texels side by side get dithers far apart: steps of the plastic number's powers (Roberts 2018, "R2 sequence").
     uvec2 at = uvec2(gl_FragCoord.xy);
-    if (back.opacity * optics.w <= unit(dither + at.x * 3242174889u + at.y * 2447445413u)) discard;
+    if (back.opacity <= unit(dither + at.x * 3242174889u + at.y * 2447445413u)) discard;
     gl_FragDepth = clamp(depth + back.s * depth_per_metre, 0.0, 1.0);
 }

@@ -37,15 +37,18 @@ ViewBasis fetch_basis(samplerBuffer bases, uint view) {
     return ViewBasis(texelFetch(bases, at), texelFetch(bases, at + 1), texelFetch(bases, at + 2), texelFetch(bases, at + 3));
 }
 
+// Rotation back by a turn's cosine and sine.
+mat3 rotation_back(vec2 turn) { return mat3(turn.x, -turn.y, 0.0, turn.y, turn.x, 0.0, 0.0, 0.0, 1.0); }
+
+// A vector turned.
+vec3 rotated(vec2 turn, vec3 m) { return vec3(turn.x * m.x - turn.y * m.y, turn.y * m.x + turn.x * m.y, m.z); }
+
 // Rotation back by the tree's turn.
-mat3 tree_rotation(Tree t) {
-    return mat3(t.turn.x, -t.turn.y, 0.0, t.turn.y, t.turn.x, 0.0, 0.0, 0.0, 1.0);
-}
+mat3 tree_rotation(Tree t) { return rotation_back(t.turn); }
 
 // A point of scaled tree space in the world, from the camera.
 vec3 world_from_tree(Tree t, Species kind, vec3 p) {
-    vec3 m = p * kind.scale_to_metres * t.scale;
-    return t.centre + vec3(t.turn.x * m.x - t.turn.y * m.y, t.turn.y * m.x + t.turn.x * m.y, m.z);
+    return t.centre + rotated(t.turn, p * kind.scale_to_metres * t.scale);
 }
 
 // A point or direction in a view: (u - 1/2, v - 1/2, depth).

@@ -3,7 +3,6 @@
 use crate::Result;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::frame::Forest;
-use crate::frame::shadows::TerrainPush;
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders, vk};
 use crate::plan::Plan;
 
@@ -65,7 +64,7 @@ impl ShaderMap {
                     ("species", Resource::Buffer(&forest.species.table)),
                 ],
             );
-            pass.push(&TerrainPush { parameters: terrain.parameters(draws.camera.0), cascade: 0 });
+            pass.push(&terrain.parameters(draws.camera.0));
             pass.dispatch([draws.camera.1, 1, 1]);
         });
     }

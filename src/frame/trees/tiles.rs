@@ -253,7 +253,7 @@ impl TreeTiles {
                 ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
                 ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
                 ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
-                ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+                ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
             ];
             pass.bind(&self.shade, &with(&all, &shown));
             pass.push(&self.parameters);

@@ -93,7 +93,7 @@ impl Trees {
                 ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
                 ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
                 ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
-                ("shadow_map", Resource::Texture(shadow_map, Sampler::Nearest)),
+                ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
             ];
             for (k, program) in self.programs.iter().enumerate() {
                 pass.bind(program, &bound);

@@ -77,8 +77,10 @@ Shown shade(uint rank, vec2 offset, out float depth) {
     ray.weights = vec3(t.light_weights, 1.0 - t.light_weights.x - t.light_weights.y);
     uint cascade = min(t.cascade, MAX_CASCADES - 1u);
     mat4 shadow = v.cascade_from_world[0];
+    ray.turn = v.cascade_turn[0].xy;
     for (uint k = 1u; k < MAX_CASCADES; k++) {
         if (k == cascade) shadow = v.cascade_from_world[k];
+        if (k == cascade) ray.turn = v.cascade_turn[k].xy;
     }
     ray.entry = (shadow * vec4(world, 1.0)).xyz;
     ray.deeper = (shadow * vec4(v.sun_direction, 0.0)).z;
