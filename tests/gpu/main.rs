@@ -21,6 +21,7 @@ mod shader_map;
 mod silhouettes;
 mod soak;
 mod tables;
+mod tiles;
 mod transfer;
 mod tree;
 mod views;
