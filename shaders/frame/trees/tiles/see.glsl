@@ -106,6 +106,31 @@ uint sees(Sight s, vec2 pixel, out float depth) {
     return mask & within;
 }
 
+// A pixel's way through its trees.
+struct Next {
+    uint trees;  // bits of those of the current word that are left
+    uint word;   // behind the current
+    uint tree;   // to look at
+    bool done;   // there is none
+    bool hidden; // because all that its samples see is nearer than the next can be
+};
+
+// Goes on to the pixel's next tree; returns the turns that this took.
+uint find_next(inout Next next, float farthest, bool whole, uint begin, uint words, uint end, uint column, uint row) {
+    uint first = next.word;
+    while (next.trees == 0u && next.word < words && !next.done) {
+        next.trees = columns[next.word * 8u + column] & rows[next.word * 8u + row];
+        next.word++;
+    }
+    next.done = next.done || next.trees == 0u;
+    uint k = (next.word - 1u) * 32u + uint(findLSB(max(next.trees, 1u)));
+    next.tree = tree_at(whole, begin + (next.done ? 0u : k), end);
+    next.trees &= next.trees - 1u;
+    next.hidden = !next.done && farthest * bin_depth(sight_bin(records, next.tree)) > p.near;
+    next.done = next.done || next.hidden;
+    return next.word - first;
+}
+
 void main() {
     uvec2 corner = gl_WorkGroupID.xy * TILE_SIDE;
     uint column = gl_LocalInvocationIndex, turns = 0u;
@@ -142,30 +167,22 @@ void main() {
                 }
             }
             for (uint k = 0u; k < SAMPLES; k++) farthest = min(farthest, depth[k]);
-            bool done = !inside;
-            for (uint word = 0u; word < words && !done; word++) {
-                uint trees = columns[word * 8u + column] & rows[word * 8u + row];
-                while (trees != 0u && !done) {
-                    uint k = word * 32u + uint(findLSB(trees));
-                    trees &= trees - 1u;
-                    uint tree = tree_at(whole, begin + k, end);
-                    Sight s = unpack_sight(records, tree);
-                    float z;
-                    uint mask = sees(s, vec2(pixel) + 0.5, z);
-                    done = farthest * bin_depth(s.bin) > p.near;
-                    float now = 1.0;
-                    for (uint i = 0u; i < SAMPLES; i++) {
-                        bool nearer = (mask >> i & 1u) != 0u && z >= depth[i] && !done;
-                        depth[i] = nearer ? z : depth[i];
-                        tree_of[i] = nearer ? tree + 1u : tree_of[i];
-                        now = min(now, depth[i]);
-                    }
-                    farthest = now;
-                    turns++;
+            // One loop over all words: invocations that are done with one go on to the next while others are not.
+            Next next = Next(0u, 0u, 0u, !inside, false);
+            turns += find_next(next, farthest, whole, begin, words, end, column, row);
+            while (!next.done) {
+                float z;
+                uint mask = sees(unpack_sight(records, next.tree), vec2(pixel) + 0.5, z);
+                farthest = 1.0;
+                for (uint i = 0u; i < SAMPLES; i++) {
+                    bool nearer = (mask >> i & 1u) != 0u && z >= depth[i];
+                    depth[i] = nearer ? z : depth[i];
+                    tree_of[i] = nearer ? next.tree + 1u : tree_of[i];
+                    farthest = min(farthest, depth[i]);
                 }
-                turns++;
+                turns += 1u + find_next(next, farthest, whole, begin, words, end, column, row);
             }
-            open = open || (inside && !done);
+            open = open || (inside && !next.hidden);
             for (uint k = 0u; k < SAMPLES; k++) {
                 if (inside) seen.items[at + k] = tree_of[k];
             }

@@ -46,6 +46,9 @@ uvec4 sight_words(Sight s, uint k) {
     return uvec4(packHalf2x16(vec2(s.toward[0].z, s.toward[1].z)), packHalf2x16(vec2(s.toward[2].z, s.closeness)), s.row);
 }
 
+// Its bin of depth alone.
+uint sight_bin(usamplerBuffer records, uint tree) { return texelFetch(records, int(tree * SIGHT_TEXELS) + 3).w >> 16u; }
+
 Sight unpack_sight(usamplerBuffer records, uint tree) {
     int at = int(tree * SIGHT_TEXELS);
     Sight s;
