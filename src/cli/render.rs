@@ -366,8 +366,12 @@ fn draw(
 
 /// The setting that holds a time.
 fn choose(args: &Args, gpu: &Gpu, scene: &Scene, time: Duration) -> Result<Choice> {
-    let subject =
-        Subject { scene: SceneIdentity::new(scene), size: args.scene.size, device: gpu.info().into() };
+    let subject = Subject {
+        scene: SceneIdentity::new(scene),
+        size: args.scene.size,
+        device: gpu.info().into(),
+        rasterizer: args.rasterizer.chosen().map(|r| r.name().into()),
+    };
     let file = match &args.sweep {
         Some(file) => file.clone(),
         None => {
