@@ -131,6 +131,7 @@ fn more_trees_than_a_tile_can_go_through_are_refused() {
     scene.cameras[0].position = [-100.0, 1200.0, 60.0];
     scene.cameras[0].target = [1200.0, 1200.0, 30.0];
     scene.cameras[0].vertical_fov = 80.0;
+    scene.sun.irradiance = [0.0; 3];
     let drawing = Drawing { representation: Representation::ZField, rasterizer: Some(Rasterizer::Tiles) };
     // Without lists a tile of sky looks at all of them.
     let plan = Plan { tile_steps: 0, ..plan(&gpu, &scene, [16, 8], false, drawing) };
