@@ -14,8 +14,8 @@
 
 const uint PART = 1024u;       // trees of a part of a list
 const uint WORDS = PART / 32u; // of bits a pixel
-// Drivers end loops in silence after 65,535 turns of all loops of an invocation together (llvmpipe), and how many turns a loop has
-// there depends on what the compiler unrolled: so every loop that may be long is seen to have reached its end, or the tile says so.
+// Drivers end loops in silence after 65,535 turns of all loops of an invocation together (llvmpipe): before, a tile gives up aloud.
+const uint MOST_TURNS = 60000u;
 
 layout(local_size_x = 8) in;
 layout(binding = 0) uniform usamplerBuffer records;
@@ -113,27 +113,27 @@ struct Next {
     uint tree;   // to look at
     bool done;   // there is none
     bool hidden; // because all that its samples see is nearer than the next can be
-    bool cut;    // the driver ended a loop before its end
 };
 
-// Goes on to the pixel's next tree.
-void find_next(inout Next next, float farthest, bool whole, uint begin, uint words, uint end, uint column, uint row) {
+// Goes on to the pixel's next tree; returns the turns that this took.
+uint find_next(inout Next next, float farthest, bool whole, uint begin, uint words, uint end, uint column, uint row) {
+    uint first = next.word;
     while (next.trees == 0u && next.word < words && !next.done) {
         next.trees = columns[next.word * 8u + column] & rows[next.word * 8u + row];
         next.word++;
     }
-    next.cut = next.cut || (next.trees == 0u && next.word < words && !next.done);
     next.done = next.done || next.trees == 0u;
     uint k = (next.word - 1u) * 32u + uint(findLSB(max(next.trees, 1u)));
     next.tree = tree_at(whole, begin + (next.done ? 0u : k), end);
     next.trees &= next.trees - 1u;
     next.hidden = !next.done && farthest * bin_depth(sight_bin(records, next.tree)) > p.near;
     next.done = next.done || next.hidden;
+    return next.word - first;
 }
 
 void main() {
     uvec2 corner = gl_WorkGroupID.xy * TILE_SIDE;
-    uint column = gl_LocalInvocationIndex;
+    uint column = gl_LocalInvocationIndex, turns = 0u;
     uvec2 list_at = corner >> p.list_shift;
     uint list = list_at.y * p.lists_across + list_at.x;
     bool whole = state.items[0].whole != 0u;
@@ -142,13 +142,13 @@ void main() {
         first = list > 0u ? texelFetch(ends, int(list * BIN_LANES) - 1).x : 0u;
         end = texelFetch(ends, int((list + 1u) * BIN_LANES) - 1).x;
     }
-    bool more = true, cut = false, parted = end > first + PART;
+    bool more = true, parted = end > first + PART;
     for (uint begin = first; more; begin += PART) {
         uint count = min(end - min(begin, end), PART), words = (count + 31u) / 32u;
         note_boxes(whole, begin, count, end, corner, column);
+        turns += 3u * words;
         bool open = false;
-        uint row = 0u;
-        for (; row < TILE_SIDE; row++) {
+        for (uint row = 0u; row < TILE_SIDE; row++) {
             uvec2 pixel = corner + uvec2(column, row);
             bool inside = pixel.x < p.size.x && pixel.y < p.size.y;
             uint at = (min(pixel.y, p.size.y - 1u) * p.size.x + min(pixel.x, p.size.x - 1u)) * SAMPLES;
@@ -168,8 +168,8 @@ void main() {
             }
             for (uint k = 0u; k < SAMPLES; k++) farthest = min(farthest, depth[k]);
             // One loop over all words: invocations that are done with one go on to the next while others are not.
-            Next next = Next(0u, 0u, 0u, !inside, false, false);
-            find_next(next, farthest, whole, begin, words, end, column, row);
+            Next next = Next(0u, 0u, 0u, !inside, false);
+            turns += find_next(next, farthest, whole, begin, words, end, column, row);
             while (!next.done) {
                 float z;
                 uint mask = sees(unpack_sight(records, next.tree), vec2(pixel) + 0.5, z);
@@ -180,10 +180,9 @@ void main() {
                     tree_of[i] = nearer ? next.tree + 1u : tree_of[i];
                     farthest = min(farthest, depth[i]);
                 }
-                find_next(next, farthest, whole, begin, words, end, column, row);
+                turns += 1u + find_next(next, farthest, whole, begin, words, end, column, row);
             }
             open = open || (inside && !next.hidden);
-            cut = cut || next.cut || !next.done;
             for (uint k = 0u; k < SAMPLES; k++) {
                 if (inside) seen.items[at + k] = tree_of[k];
             }
@@ -193,8 +192,7 @@ void main() {
         }
         if (open) atomicOr(left, 1u);
         barrier();
-        cut = cut || row < TILE_SIDE;
         more = parted && begin + PART < end && left != 0u;
+        if (turns > MOST_TURNS) state.items[0].overrun = 1u;
     }
-    if (cut || more) state.items[0].overrun = 1u;
 }
