@@ -1,6 +1,8 @@
 //! What a scene requires: every table, view set, cache, target and pass, with the reason and the bytes, before anything
 //! is allocated. What no one needs is not in the plan, and is not built.
 
+mod tiles;
+
 use crate::camera::Eye;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
@@ -13,6 +15,8 @@ use crate::physics::raster::Raster;
 use crate::physics::views;
 use crate::scene::{Albedo, Camera, Distribution, Scene, Sky};
 use crate::{Error, Result};
+
+pub use tiles::{Drawing, Rasterizer, TILE_STEPS, TileBuffer, TileBuffers};
 
 /// Seed quads along the range, at most.
 const QUADS_IN_RANGE: f64 = 24.0;
@@ -29,7 +33,7 @@ const COVER_SLOTS: f64 = 256.0;
 /// Storage buffers that every Vulkan device binds, when no device is known.
 const ASSUMED_STORAGE: u64 = 128 << 20;
 
-/// Pipelines of the tree pass, and for which trees.
+/// Pipelines of the graphics rasteriser's tree pass, and for which trees.
 const TREE_PIPELINES: [(&str, &str); 4] = [
     ("trees magnified", "near trees: texels larger than pixels, filtered estimates"),
     ("trees", "trees of many pixels: unfiltered estimates"),
@@ -72,23 +76,6 @@ impl Representation {
             Representation::ZField => 1e15,
             Representation::ShaderMap => 1e-3,
         }
-    }
-}
-
-/// What finds the samples of trees that are drawn one by one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Rasterizer {
-    /// The graphics pipeline: a quad a tree, every fragment lit.
-    Graphics,
-    /// Compute tiles: front to back, visibility first, then each pixel's trees lit once.
-    Tiles,
-}
-
-impl Rasterizer {
-    /// Tiles where the device is a CPU, on which the layers of trees behind each other cost most; else the graphics pipeline.
-    pub fn auto(device: Option<&DeviceInfo>) -> Self {
-        if device.is_none_or(|d| d.kind == "cpu") { Rasterizer::Tiles } else { Rasterizer::Graphics }
     }
 }
 
@@ -145,9 +132,11 @@ pub struct Plan {
     pub representation: Representation,
     /// What the picture shows; [`Plan::new`] says radiance, and whoever wants another mode sets it before the renderer is made.
     pub view_mode: ViewMode,
-    /// What finds the samples of trees; [`Plan::new`] says [`Rasterizer::auto`], and whoever wants the other sets it before the
-    /// renderer is made.
+    /// What finds the samples of trees.
     pub rasterizer: Rasterizer,
+    /// Steps of writing the tiles' lists, at most: [`TILE_STEPS`]; tests set fewer before the renderer is made.
+    #[serde(skip)]
+    pub tile_steps: u32,
     /// Image size, pixels.
     pub size: [u32; 2],
     /// Samples a pixel.
@@ -229,7 +218,7 @@ impl Plan {
         layers: bool,
         device: Option<&DeviceInfo>,
     ) -> Result<Self> {
-        Self::for_eye(scene, &Eye::new(camera, &scene.terrain, size), layers, Representation::Auto, device)
+        Self::for_eye(scene, &Eye::new(camera, &scene.terrain, size), layers, Drawing::default(), device)
     }
 
     /// Plans an image of a scene as an eye sees it.
@@ -240,10 +229,10 @@ impl Plan {
         scene: &Scene,
         eye: &Eye,
         layers: bool,
-        representation: Representation,
+        drawing: impl Into<Drawing>,
         device: Option<&DeviceInfo>,
     ) -> Result<Self> {
-        Self::for_path(scene, eye, &[], layers, representation, device)
+        Self::for_path(scene, eye, &[], layers, drawing, device)
     }
 
     /// Plans an image of a scene as an eye sees it that will also be at other places, of the same optics.
@@ -255,16 +244,18 @@ impl Plan {
         eye: &Eye,
         places: &[[f64; 3]],
         layers: bool,
-        representation: Representation,
+        drawing: impl Into<Drawing>,
         device: Option<&DeviceInfo>,
     ) -> Result<Self> {
+        let Drawing { representation, rasterizer } = drawing.into();
         let s = &scene.settings;
         let has_sun = scene.sun.shines();
         let mut plan = Plan {
             items: Vec::new(),
             representation,
             view_mode: ViewMode::Radiance,
-            rasterizer: Rasterizer::auto(device),
+            rasterizer: Rasterizer::Graphics,
+            tile_steps: TILE_STEPS,
             size: eye.size,
             samples: samples(s.samples, device),
             layers,
@@ -330,6 +321,7 @@ impl Plan {
             0.0 => diagonal,
             chosen => chosen,
         };
+        plan.choose_rasterizer(rasterizer, device)?;
         plan.list(scene);
         plan.check(s.memory_mib, device)?;
         Ok(plan)
@@ -646,7 +638,10 @@ impl Plan {
         }
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         let colour = if self.layers { 8 + 8 + 4 + 8 } else { 8 };
-        let multi = if self.samples > 1 { u64::from(self.samples) * (colour + 4) } else { 0 };
+        let tiles = self.rasterizer == Rasterizer::Tiles;
+        // What tiles find by samples they put together by pixels: only depth has samples.
+        let drawn = if tiles { 4 } else { colour + 4 };
+        let multi = if self.samples > 1 { u64::from(self.samples) } else { 0 };
         let reason = format!(
             "{} x {} pixels of {} samples{}",
             self.size[0],
@@ -654,10 +649,28 @@ impl Plan {
             self.samples,
             if self.layers { ", layers apart" } else { "" }
         );
-        add("target", "image", reason, pixels * (multi + colour + 4 + 4));
+        add("target", "image", reason, pixels * (multi * drawn + colour + 4 + 4));
+        if tiles {
+            let reason = "which quad of the ground each sample sees, so that it is lit once".to_string();
+            add("target", "quads seen", reason, pixels * (multi + 1) * 4);
+            if self.layers {
+                let reason = "layers apart: how deep each pixel's first sample is".to_string();
+                add("target", "first depth", reason, pixels * 4);
+            }
+        }
+        if self.z_fields && tiles {
+            for buffer in TileBuffers::new(self).all() {
+                let (name, reason, bytes) = buffer.item();
+                add("target", name, reason, bytes);
+            }
+        }
+        if tiles {
+            add("pipeline", "ground", "light on the ground, once a pixel that sees it".into(), 0);
+        }
         if self.z_fields {
-            for (name, reason) in TREE_PIPELINES {
-                add("pipeline", name, reason.into(), 0);
+            let pipelines = if tiles { &tiles::TREE_PIPELINES[..] } else { &TREE_PIPELINES };
+            for (name, reason) in pipelines {
+                add("pipeline", name, (*reason).into(), 0);
             }
             if self.cascades > 0 {
                 let reason =
@@ -693,7 +706,16 @@ impl Plan {
             pass("shader-map", "trees beyond range, and average light");
         }
         pass("terrain", "the ground");
-        if self.z_fields {
+        if self.z_fields && tiles {
+            tiles::TREE_PASSES.iter().for_each(|(name, reason)| pass(name, reason));
+        }
+        if tiles {
+            pass("ground", "light on the ground, once a pixel that sees it");
+        }
+        if self.z_fields && tiles {
+            pass("tree light", "light on trees, once a pixel and tree that it sees");
+        }
+        if self.z_fields && !tiles {
             pass("trees", "trees within range");
         }
         pass("tone map", "the picture for display");

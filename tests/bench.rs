@@ -55,11 +55,22 @@ fn json(folder: &Path, args: &[&str]) -> Value {
 #[test]
 fn names_of_the_json_and_csv_stay() {
     let dir = tempfile::tempdir().unwrap();
-    let files = ["--csv", "b.csv", "--bmf", "m.json", "-o", "o.json", "--pipeline-statistics"];
+    let files = [
+        "--csv",
+        "b.csv",
+        "--bmf",
+        "m.json",
+        "-o",
+        "o.json",
+        "--pipeline-statistics",
+        "--rasterizer",
+        "graphics",
+    ];
     let result = json(dir.path(), &[&["--frames", "3", "--step", "4"], &files[..]].concat());
     let named = ["settings", "assets", "bake_cache", "heaps", "allocations", "variables", "metrics"];
     let found = keys::keys(&result, &named);
     assert!(found == include_str!("data/bench_keys.txt"), "{found}");
+    assert_eq!(result["rasterizer"], "graphics");
     let read = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
     assert_eq!(serde_json::from_str::<Value>(&read("o.json")).unwrap(), result);
 

@@ -172,6 +172,17 @@ fn plan_lists_what_the_scene_needs_and_no_more() {
     for name in ["height map", "z-field views of oak", "seeds", "shadow cascades", "image", "tone map"] {
         assert!(all.iter().any(|n| n == name), "{name} is not in {all:?}");
     }
+    for (rasterizer, own, other) in
+        [("graphics", "trees converged", "tile lists"), ("tiles", "tile lists", "trees converged")]
+    {
+        let args = ["plan", "--rasterizer", rasterizer, "--json"];
+        assert_eq!(json(&args)["plan"]["rasterizer"], rasterizer);
+        let names = names(&args);
+        assert!(
+            names.iter().any(|n| n == own) && names.iter().all(|n| n != other),
+            "{rasterizer}: {names:?}"
+        );
+    }
     let dir = tempfile::tempdir().unwrap();
     let bare = scene(
         dir.path(),

@@ -21,6 +21,7 @@ fn empty() -> BenchResult {
         path: PathIdentity { name: "approach".into(), step_s: 0.5, views: 16, keyframes: Vec::new() },
         size: [160, 120],
         settings: BTreeMap::from([("cascades".into(), 3.0)]),
+        rasterizer: None,
         timing: TimingIdentity { stamps: true, apart: true, pipeline_statistics: false },
         device: DeviceIdentity {
             name: "llvmpipe".into(),
@@ -209,6 +210,12 @@ fn the_gate_and_the_refusals_have_their_exit_codes() {
     assert!(message.contains("--allow-different settings") && message.contains("cascades"), "{message}");
     assert_eq!(canopy(&[&a, &other, "--allow-different", "settings"]).status.code(), Some(0));
     assert_eq!(canopy(&[&a, &other, "--allow-different", "size,device"]).status.code(), Some(2));
+    // A recorded run does not say by what its trees were drawn: by the graphics pipeline, the only one there was.
+    let drawn = |by: &str| BenchResult { rasterizer: Some(by.into()), ..run.clone() };
+    let (graphics, tiles) = (write("d.json", &drawn("graphics")), write("e.json", &drawn("tiles")));
+    let out = canopy(&[&a, &tiles]);
+    assert!(out.status.code() == Some(2) && text(&out).contains("rasterizer"), "{}", text(&out));
+    assert_eq!(canopy(&[&a, &graphics]).status.code(), Some(0));
     let json = canopy(&[&a, &b, "--json"]);
     let json: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
     assert_eq!((&json["command"], &json["schema_version"]), (&"compare".into(), &1.into()));

@@ -48,6 +48,12 @@ fn the_tables_of_sweeps_are_those_of_the_results() {
 }
 
 #[test]
+fn the_conformance_cases_are_counted() {
+    let counted = format!("check a driver: {} named cases", canopy::measure::conform::cases().len());
+    assert!(include_str!("../README.md").contains(&counted), "README.md must say: {counted}");
+}
+
+#[test]
 fn paths_are_named() {
     let readme = include_str!("../README.md");
     for (name, _) in CameraPath::BUILTIN {

@@ -15,7 +15,7 @@ use canopy::scene::Scene;
 use canopy::settings::Settings;
 use canopy::{Error, Result};
 
-use super::options::{DeviceOptions, PrintOptions, SceneOptions, assignment, knobs_help};
+use super::options::{DeviceOptions, PrintOptions, RasterizerOptions, SceneOptions, assignment, knobs_help};
 use super::output::{self, Table};
 
 const EXAMPLES: &str = "\
@@ -54,6 +54,8 @@ pub struct Args {
     /// Measure a second setting in turn with the first (A B, B A, …), which differs in this knob; repeatable: several knobs
     #[arg(long, value_name = "KNOB=VALUE", value_parser = assignment)]
     against: Vec<(String, f64)>,
+    #[command(flatten)]
+    rasterizer: RasterizerOptions,
     /// Count vertices, primitives, fragments and invocations of each pass
     #[arg(long)]
     pipeline_statistics: bool,
@@ -156,7 +158,7 @@ fn bench(
     let views = request.path.views(request.step)?;
     let subject = |settings| {
         let scene = Scene { settings, ..scene.clone() };
-        let plan = plan(&scene, &views, args.scene.size, gpu)?;
+        let plan = plan(&scene, &views, args.scene.size, args.rasterizer.chosen(), gpu)?;
         let mut subject = Subject::new(gpu, scene, plan, cache::default_dir().as_deref(), args.print.quiet)?;
         subject.cold.load_s = load_s;
         Ok(subject)
@@ -212,12 +214,13 @@ fn write(file: &Path, text: &str) -> Result<()> {
 /// The table.
 fn text(r: &BenchResult) -> String {
     let mut text = format!(
-        "{}, path {}, {} x {} on {}\n{} frames, {} views a round\n\n",
+        "{}, path {}, {} x {} on {}{}\n{} frames, {} views a round\n\n",
         r.scene.name,
         r.path.name,
         r.size[0],
         r.size[1],
         r.device.name,
+        r.rasterizer.as_ref().map_or(String::new(), |name| format!(", rasterizer {name}")),
         r.frames.len(),
         r.path.views
     );

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use canopy::gpu::{Gpu, GpuOptions, Validation};
-use canopy::plan::Representation;
+use canopy::plan::{Drawing, Rasterizer, Representation};
 use canopy::reference::{self, Light, Until};
 use canopy::scene::{Camera, Scene};
 use canopy::settings::{KNOBS, PRESETS, Settings};
@@ -92,6 +92,36 @@ impl DeviceOptions {
             (Ok(()), Ok(value)) => Ok(value),
         }
     }
+}
+
+/// What finds the samples of trees.
+#[derive(clap::Args, Clone, Copy)]
+pub struct RasterizerOptions {
+    /// What finds the samples of trees: the graphics pipeline, which lights every fragment, or compute tiles, which find what is
+    /// seen and light it once. auto: tiles on CPU devices that can read as many texels of a buffer as the plan's trees (eight
+    /// each) and the image's samples take, else graphics
+    #[arg(long = "rasterizer", value_name = "NAME", default_value = "auto", value_parser = rasterizers())]
+    choice: RasterizerChoice,
+}
+
+impl RasterizerOptions {
+    /// The one that was chosen; `None`: what suits the device.
+    pub fn chosen(self) -> Option<Rasterizer> {
+        self.choice.0
+    }
+
+    /// Trees drawn as a representation.
+    pub fn drawing(self, representation: Representation) -> Drawing {
+        Drawing { representation, rasterizer: self.choice.0 }
+    }
+}
+
+/// A rasteriser, or none: whichever suits the device.
+#[derive(Clone, Copy, Debug)]
+pub struct RasterizerChoice(Option<Rasterizer>);
+
+fn rasterizers() -> impl TypedValueParser<Value = RasterizerChoice> {
+    named(Rasterizer::NAMES.map(|(name, r)| (name, RasterizerChoice(r))))
 }
 
 /// A parser of one of the names in a table, to its value.

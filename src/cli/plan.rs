@@ -1,12 +1,13 @@
 //! `canopy plan`.
 
+use canopy::camera::Eye;
 use canopy::gpu::DeviceInfo;
-use canopy::plan::Plan;
+use canopy::plan::{Plan, Representation};
 use canopy::settings::Settings;
 use canopy::{Error, Result};
 
 use super::SCHEMA_VERSION;
-use super::options::{PrintOptions, SceneOptions, knobs_help};
+use super::options::{PrintOptions, RasterizerOptions, SceneOptions, knobs_help};
 use super::output::{self, Table};
 
 const EXAMPLES: &str = "\
@@ -24,6 +25,8 @@ pub struct Args {
     /// Plan for an EXR too: layers apart
     #[arg(long)]
     layers: bool,
+    #[command(flatten)]
+    rasterizer: RasterizerOptions,
     /// Device by UUID or part of its name; left out: the best that fits
     #[arg(long, value_name = "UUID|NAME")]
     device: Option<String>,
@@ -51,7 +54,9 @@ pub fn run(args: &Args) -> Result<()> {
         Err(Error::NoDevice(_)) if args.device.is_none() => None,
         Err(e) => return Err(e),
     };
-    let plan = Plan::new(&scene, &camera, args.scene.size, args.layers, device.as_ref())?;
+    let eye = Eye::new(&camera, &scene.terrain, args.scene.size);
+    let drawing = args.rasterizer.drawing(Representation::Auto);
+    let plan = Plan::for_eye(&scene, &eye, args.layers, drawing, device.as_ref())?;
     if args.print.json {
         return output::json(&Report {
             schema_version: SCHEMA_VERSION,
@@ -78,11 +83,12 @@ pub fn run(args: &Args) -> Result<()> {
     }
     table.row(["".into(), "total".into(), "device memory".into(), output::bytes(plan.bytes())]);
     output::print(&format!(
-        "{}, camera {}, {} x {} ({whose})\n{}",
+        "{}, camera {}, {} x {}, rasterizer {} ({whose})\n{}",
         scene.name,
         camera.name,
         plan.size[0],
         plan.size[1],
+        plan.rasterizer.name(),
         table.text()
     ))
 }

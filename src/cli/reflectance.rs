@@ -11,7 +11,9 @@ use canopy::scene::{Camera, Scene};
 use canopy::{Error, Result};
 
 use super::SCHEMA_VERSION;
-use super::options::{DeviceOptions, Drawn, PrintOptions, ReferenceOptions, SceneOptions, knobs_help, named};
+use super::options::{
+    DeviceOptions, Drawn, PrintOptions, RasterizerOptions, ReferenceOptions, SceneOptions, knobs_help, named,
+};
 use super::output;
 
 const EXAMPLES: &str = "\
@@ -84,6 +86,8 @@ pub struct Args {
     /// How trees are drawn: auto, zfield, shader-map, or reference (path tracing on the CPU); several with commas between
     #[arg(long, value_name = "NAMES", default_value = "auto", value_delimiter = ',', value_parser = named(Drawn::names()))]
     representation: Vec<Drawn>,
+    #[command(flatten)]
+    rasterizer: RasterizerOptions,
     #[command(flatten)]
     reference: ReferenceOptions,
     /// Trees per m² of all species together, instead of the scene's mean
@@ -252,7 +256,8 @@ fn all(args: &Args, scene: &Scene, camera: &Camera, densities: &[f64]) -> Result
                 (Drawn::By(representation), Some(gpu)) => {
                     for &distance in &args.distance.0 {
                         let (sun_zenith, slope, views) = (s.sun_zenith, s.slope, s.views.clone());
-                        let r = Request { sun_zenith, slope, distance, representation, views };
+                        let drawing = args.rasterizer.drawing(representation);
+                        let r = Request { sun_zenith, slope, distance, drawing, views };
                         let from = (camera, size);
                         let mut step = || progress.step(1);
                         add(distance, measure(gpu, scene, densities, &baked, from, &method, &r, &mut step)?);

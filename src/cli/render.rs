@@ -18,7 +18,8 @@ use canopy::{Error, Result};
 
 use super::SCHEMA_VERSION;
 use super::options::{
-    self, DeviceOptions, Drawn, PrintOptions, ReferenceOptions, SceneOptions, knobs_help, named,
+    self, DeviceOptions, Drawn, PrintOptions, RasterizerOptions, ReferenceOptions, SceneOptions, knobs_help,
+    named,
 };
 use super::output::{self, Table};
 use super::reference;
@@ -64,6 +65,8 @@ pub struct Args {
     /// How trees are drawn: auto, zfield or shader-map at any distance, or reference: path tracing on the CPU
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = named(Drawn::names()))]
     representation: Drawn,
+    #[command(flatten)]
+    rasterizer: RasterizerOptions,
     #[command(flatten)]
     reference: ReferenceOptions,
     /// Reference: file to go on from, if it is there, and to write to: now and then, and at the end
@@ -234,6 +237,7 @@ pub fn run(args: &Args) -> Result<()> {
 fn refuse_for_reference(args: &Args) -> Result<()> {
     let given = [
         (args.view_mode != ViewMode::Radiance, "--view-mode"),
+        (args.rasterizer.chosen().is_some(), "--rasterizer"),
         (args.frames != 1, "--frames"),
         (args.capture_frame.is_some(), "--capture-frame"),
         (args.device.device.is_some(), "--device"),
@@ -272,7 +276,8 @@ fn draw(
         scene.settings = choice.settings.clone();
     }
     let eye = Eye::new(camera, &scene.terrain, args.scene.size);
-    let mut plan = Plan::for_eye(&scene, &eye, args.exr.is_some(), representation, Some(gpu.info()))?;
+    let drawing = args.rasterizer.drawing(representation);
+    let mut plan = Plan::for_eye(&scene, &eye, args.exr.is_some(), drawing, Some(gpu.info()))?;
     plan.view_mode = args.view_mode;
     let scene = Arc::new(scene);
     let start = Instant::now();
@@ -361,8 +366,12 @@ fn draw(
 
 /// The setting that holds a time.
 fn choose(args: &Args, gpu: &Gpu, scene: &Scene, time: Duration) -> Result<Choice> {
-    let subject =
-        Subject { scene: SceneIdentity::new(scene), size: args.scene.size, device: gpu.info().into() };
+    let subject = Subject {
+        scene: SceneIdentity::new(scene),
+        size: args.scene.size,
+        device: gpu.info().into(),
+        rasterizer: args.rasterizer.chosen().map(|r| r.name().into()),
+    };
     let file = match &args.sweep {
         Some(file) => file.clone(),
         None => {
@@ -419,6 +428,7 @@ fn text(r: &Report) -> String {
     text += &passes.text();
 
     let mut drawn = Table::new(1, &["drawn", ""]);
+    drawn.row(["rasterizer".into(), r.plan.rasterizer.name().into()]);
     drawn.row(["trees as z-fields".into(), r.trees.by_representation.zfield.to_string()]);
     for (k, n) in r.trees.casters_by_cascade.iter().enumerate() {
         drawn.row([format!("trees in cascade {k}"), n.to_string()]);

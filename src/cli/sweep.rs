@@ -16,7 +16,7 @@ use canopy::scene::Camera;
 use canopy::settings::{KNOBS, PRESETS};
 use canopy::{Error, Result};
 
-use super::options::{self, Bounces, DeviceOptions, Goal, PrintOptions};
+use super::options::{self, Bounces, DeviceOptions, Goal, PrintOptions, RasterizerOptions};
 use super::output::{self, Table};
 
 const EXAMPLES: &str = "\
@@ -85,6 +85,8 @@ pub struct Args {
     #[arg(long, conflicts_with = "json")]
     markdown: bool,
     #[command(flatten)]
+    rasterizer: RasterizerOptions,
+    #[command(flatten)]
     device: DeviceOptions,
     #[command(flatten)]
     print: PrintOptions,
@@ -119,6 +121,7 @@ pub fn run(args: &Args) -> Result<()> {
         shard: args.shard.unwrap_or((1, 1)),
         product: args.product.into(),
         references: Vec::new(),
+        rasterizer: args.rasterizer.chosen(),
         cache: cache::default_dir(),
         validate: args.device.validate,
         quiet: args.print.quiet,

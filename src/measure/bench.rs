@@ -18,7 +18,7 @@ use crate::camera::{Eye, auto_exposure};
 use crate::clock::monotonic_ns;
 use crate::frame::{FrameReport, Renderer};
 use crate::gpu::{Gpu, PassTime, TimingOptions};
-use crate::plan::Plan;
+use crate::plan::{Drawing, Plan, Rasterizer};
 use crate::progress::Progress;
 use crate::scene::{Camera, Scene};
 
@@ -73,20 +73,30 @@ impl Subject {
 ///
 /// # Errors
 /// As [`Plan::new`].
-pub fn plan(scene: &Scene, views: &[Camera], size: [u32; 2], gpu: &Gpu) -> Result<Plan> {
+pub fn plan(
+    scene: &Scene,
+    views: &[Camera],
+    size: [u32; 2],
+    rasterizer: Option<Rasterizer>,
+    gpu: &Gpu,
+) -> Result<Plan> {
+    let drawing = Drawing { rasterizer, ..Default::default() };
     let mut largest: Option<Plan> = None;
     let eyes: Vec<Eye> = views.iter().map(|v| Eye::new(v, &scene.terrain, size)).collect();
     // A narrower view's range is longer: each optics with every place.
     let places: Vec<[f64; 3]> = eyes.iter().map(|e| e.position).collect();
     for eye in &eyes {
-        let plan = Plan::for_path(scene, eye, &places, false, Default::default(), Some(gpu.info()))?;
+        let plan = Plan::for_path(scene, eye, &places, false, drawing, Some(gpu.info()))?;
         if largest.as_ref().is_none_or(|l| plan.bytes() > l.bytes()) {
             largest = Some(plan);
         }
     }
     match largest {
         Some(plan) => Ok(plan),
-        None => Plan::new(scene, scene.camera(None)?, size, false, Some(gpu.info())),
+        None => {
+            let eye = Eye::new(scene.camera(None)?, &scene.terrain, size);
+            Plan::for_eye(scene, &eye, false, drawing, Some(gpu.info()))
+        }
     }
 }
 
@@ -198,6 +208,7 @@ fn result(
         },
         size: plan.size,
         settings: BenchResult::settings_of(&scene.settings),
+        rasterizer: Some(plan.rasterizer.name().into()),
         timing: gpu.timing().into(),
         device: gpu.info().into(),
         host: host.clone(),

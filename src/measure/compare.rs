@@ -17,6 +17,7 @@ use std::collections::BTreeMap;
 
 use super::results::{BenchResult, Frame};
 use super::statistics::{block_bootstrap, holm, mann_whitney, median, signed_rank};
+use crate::plan::Rasterizer;
 use crate::{Error, Result};
 
 /// Version of [`Comparison`]; raised when a key changes its meaning or goes.
@@ -166,6 +167,10 @@ pub fn differences(a: &BenchResult, b: &BenchResult) -> Vec<Difference> {
     for name in a.settings.keys().chain(b.settings.keys().filter(|k| !a.settings.contains_key(*k))) {
         check("settings", name, &a.settings.get(name), &b.settings.get(name));
     }
+    // Older results, of the time when there was only the graphics pipeline, do not say.
+    let rasterizer =
+        |r: &BenchResult| r.rasterizer.clone().unwrap_or_else(|| Rasterizer::Graphics.name().into());
+    check("settings", "rasterizer", &rasterizer(a), &rasterizer(b));
     check("timing", "timing", &a.timing, &b.timing);
     check("device", "device", &a.device, &b.device);
     check("device", "cpu", &a.host.cpu, &b.host.cpu);

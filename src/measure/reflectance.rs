@@ -16,7 +16,7 @@ use crate::camera::{Cascade, Eye, cascades};
 use crate::frame::Renderer;
 use crate::gpu::Gpu;
 use crate::physics::raster::Raster;
-use crate::plan::{Plan, Representation};
+use crate::plan::{Drawing, Plan};
 use crate::reference::{Options, World};
 use crate::scene::{Camera, Distribution, Scene, Terrain};
 use crate::{Error, Result};
@@ -40,7 +40,7 @@ pub struct Request {
     /// Distance, m.
     pub distance: f64,
     /// How trees are drawn.
-    pub representation: Representation,
+    pub drawing: Drawing,
     /// Directions of the viewer: zenith angle, negative away from the sun, and azimuth relative to the sun, degrees.
     pub views: Vec<[f64; 2]>,
 }
@@ -202,7 +202,7 @@ pub fn measure(
     let places: Vec<[f64; 3]> =
         request.views.iter().flat_map(|v| centres.iter().map(|c| eye(*v, *c).position)).collect();
     let first = eye([0.0, 0.0], centres[0]);
-    let plan = Plan::for_path(&patch, &first, &places, true, request.representation, Some(gpu.info()))?;
+    let plan = Plan::for_path(&patch, &first, &places, true, request.drawing, Some(gpu.info()))?;
     let mut renderer = Renderer::new(gpu, patch.clone(), plan, baked)?;
     let mut results = Vec::new();
     for (view, texel) in request.views.iter().zip(texels) {

@@ -30,6 +30,9 @@ pub struct BenchResult {
     pub size: [u32; 2],
     /// Value of every knob.
     pub settings: BTreeMap<String, f64>,
+    /// What found the samples of trees: `graphics` or `tiles`; absent from results that are older than the choice.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rasterizer: Option<String>,
     /// How passes were timed.
     pub timing: TimingIdentity,
     /// Which device.

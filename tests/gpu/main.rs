@@ -23,6 +23,7 @@ mod shadows_kept;
 mod silhouettes;
 mod soak;
 mod tables;
+mod tiles;
 mod transfer;
 mod tree;
 mod views;

@@ -9,10 +9,11 @@ use canopy::frame::Renderer;
 use canopy::gpu::Gpu;
 use canopy::image::{Linear, Picture};
 use canopy::physics::raster::Raster;
-use canopy::plan::{Plan, Representation};
+use canopy::plan::{Drawing, Plan, Rasterizer, Representation, TileBuffers};
 use canopy::scene::{Camera, Distribution, Scene};
 
 const SIZE: [u32; 2] = [64, 48];
+const RASTERIZERS: [Rasterizer; 2] = [Rasterizer::Graphics, Rasterizer::Tiles];
 
 fn scene() -> Scene {
     device::small_scene(
@@ -32,8 +33,9 @@ struct Drawn {
 }
 
 /// Plans, builds and draws.
-fn draw(gpu: &Gpu, scene: &Scene) -> Drawn {
-    let plan = Plan::new(scene, &scene.cameras[0], SIZE, false, Some(gpu.info())).unwrap();
+fn draw(gpu: &Gpu, scene: &Scene, rasterizer: Rasterizer) -> Drawn {
+    let eye = Eye::new(&scene.cameras[0], &scene.terrain, SIZE);
+    let plan = Plan::for_eye(scene, &eye, false, rasterizer, Some(gpu.info())).unwrap();
     drawn(gpu, scene, plan).0
 }
 
@@ -65,7 +67,7 @@ fn picture(gpu: &Gpu, scene: &Scene, plan: Plan) -> Picture {
 }
 
 /// The plan of the scene's camera, with layers.
-fn planned(gpu: &Gpu, scene: &Scene, how: Representation) -> Plan {
+fn planned(gpu: &Gpu, scene: &Scene, how: impl Into<Drawing>) -> Plan {
     let eye = Eye::new(&scene.cameras[0], &scene.terrain, SIZE);
     Plan::for_eye(scene, &eye, true, how, Some(gpu.info())).unwrap()
 }
@@ -106,14 +108,18 @@ impl Drawn {
 
 #[test]
 fn without_a_sun_there_are_no_shadows() {
+    RASTERIZERS.into_iter().for_each(without_a_sun);
+}
+
+fn without_a_sun(rasterizer: Rasterizer) {
     let gpu = device::open();
     let mut scene = scene();
-    let day = draw(&gpu, &scene);
+    let day = draw(&gpu, &scene, rasterizer);
     assert!(day.has("shadow cascades") && day.draws("shadows") && day.bytes("shadow cascades") > 1 << 18);
     for (elevation, irradiance) in [(-5.0, 1.0), (25.0, 0.0)] {
         scene.sun.elevation = elevation;
         scene.sun.irradiance = [irradiance; 3];
-        let night = draw(&gpu, &scene);
+        let night = draw(&gpu, &scene, rasterizer);
         assert!(!night.has("shadow cascades") && !night.draws("shadows"));
         for shader in ["forest/casters.comp", "frame/trees/zfield_shadow.frag"] {
             assert!(day.builds(shader) && !night.builds(shader), "{shader}: {:?}", night.pipelines);
@@ -132,11 +138,30 @@ fn without_a_sun_there_are_no_shadows() {
 
 #[test]
 fn without_trees_there_is_no_forest() {
+    RASTERIZERS.into_iter().for_each(without_trees);
+}
+
+/// Passes and pipelines that draw trees one by one.
+fn tree_drawing(rasterizer: Rasterizer) -> (&'static [&'static str], &'static [&'static str]) {
+    match rasterizer {
+        Rasterizer::Graphics => (&["trees"], &["trees", "trees magnified", "trees small", "trees converged"]),
+        Rasterizer::Tiles => (
+            &["tree order", "tree sights", "list counts", "tile lists", "tiles", "tree light"],
+            &["tree order", "tree sights", "tile lists", "tiles", "tree light", "trees seen", "list entries"],
+        ),
+    }
+}
+
+fn without_trees(rasterizer: Rasterizer) {
     let gpu = device::open();
     let mut scene = scene();
-    let forest = draw(&gpu, &scene);
-    let tree_passes =
-        ["seeds", "coverage tiles", "cull", "prefix sums", "draw commands", "compact", "shader-map", "trees"];
+    let forest = draw(&gpu, &scene, rasterizer);
+    let (passes, pipelines) = tree_drawing(rasterizer);
+    let tree_passes = [
+        &["seeds", "coverage tiles", "cull", "prefix sums", "draw commands", "compact", "shader-map"][..],
+        passes,
+    ]
+    .concat();
     let tree_items = [
         "z-field views of a",
         "seeds",
@@ -146,21 +171,21 @@ fn without_trees_there_is_no_forest() {
         "trees and lists",
         "pair tables of a",
         "view tables of a",
-        "trees converged",
         "light ray of trees",
         "shader-map nodes",
     ];
+    let tree_items = [&tree_items[..], pipelines].concat();
     assert!(tree_passes.iter().all(|p| forest.draws(p)), "{:?}", forest.passes);
     assert!(tree_items.iter().all(|p| forest.has(p)), "{:?}", forest.items);
     if let Distribution::Density { max_density, .. } = &mut scene.species[0].distribution {
         *max_density = 0.0;
     }
-    let thinned = draw(&gpu, &scene);
+    let thinned = draw(&gpu, &scene, rasterizer);
     scene.species.clear();
-    for bare in [thinned, draw(&gpu, &scene)] {
+    for bare in [thinned, draw(&gpu, &scene, rasterizer)] {
         assert!(!tree_passes.iter().any(|p| bare.draws(p)), "{:?}", bare.passes);
         assert!(!tree_items.iter().any(|p| bare.has(p)), "{:?}", bare.items);
-        for shader in ["forest/", "frame/trees/zfield", "frame/trees/shader_map"] {
+        for shader in ["forest/", "frame/trees/"] {
             let tiles = |p: &&str| !p.starts_with("forest/terrain") && p.starts_with(shader);
             assert!(forest.pipelines.iter().any(tiles), "{:?}", forest.pipelines);
             assert!(!bare.pipelines.iter().any(tiles), "{:?}", bare.pipelines);
@@ -188,6 +213,7 @@ fn without_trees_there_is_no_forest() {
 fn a_listed_forest_needs_no_pattern_and_a_plain_no_height_map() {
     let gpu = device::open();
     let mut scene = scene();
+    let draw = |gpu: &Gpu, scene: &Scene| draw(gpu, scene, Rasterizer::Graphics);
     let thinned = draw(&gpu, &scene);
     assert!(thinned.has("point pattern") && !thinned.has("height map") && !thinned.has("density maps"));
     let tree = canopy::scene::TreePosition { x: 150.0, y: 150.0, scale: None, rotation: None };
@@ -220,11 +246,81 @@ fn a_range_beyond_the_terrain_does_not_coarsen_the_seed_quads() {
 fn the_plan_knows_what_will_be_allocated() {
     let gpu = device::open();
     let scene = scene();
-    let drawn = draw(&gpu, &scene);
-    let allocated: u64 = drawn.allocated.iter().map(|(_, b)| b).sum();
-    println!("planned {} KiB, allocated {} KiB", drawn.planned >> 10, allocated >> 10);
-    // Small buffers (view, indices, tables) are not worth an item each: a tenth, and a MiB.
-    assert!(allocated <= drawn.planned + drawn.planned / 10 + (1 << 20), "{:?}", drawn.allocated);
+    for rasterizer in RASTERIZERS {
+        let drawn = draw(&gpu, &scene, rasterizer);
+        let allocated: u64 = drawn.allocated.iter().map(|(_, b)| b).sum();
+        println!("planned {} KiB, allocated {} KiB", drawn.planned >> 10, allocated >> 10);
+        // Small buffers (view, indices, tables) are not worth an item each: a tenth, and a MiB.
+        assert!(allocated <= drawn.planned + drawn.planned / 10 + (1 << 20), "{:?}", drawn.allocated);
+    }
+    gpu.close().unwrap();
+}
+
+#[test]
+fn each_rasterizer_needs_nothing_of_the_other() {
+    let gpu = device::open();
+    let scene = scene();
+    for layers in [false, true] {
+        let eye = Eye::new(&scene.cameras[0], &scene.terrain, SIZE);
+        let plan = |r: Rasterizer| Plan::for_eye(&scene, &eye, layers, r, Some(gpu.info())).unwrap();
+        let [graphics, tiles] = RASTERIZERS.map(|r| drawn(&gpu, &scene, plan(r)).0);
+        for (own, other, rasterizer) in
+            [(&graphics, &tiles, RASTERIZERS[0]), (&tiles, &graphics, RASTERIZERS[1])]
+        {
+            let (passes, items) = tree_drawing(rasterizer);
+            assert!(passes.iter().all(|p| own.draws(p) && !other.draws(p)), "{:?}", own.passes);
+            assert!(items.iter().all(|i| own.has(i) && !other.has(i)), "{:?}", own.items);
+        }
+        for shader in ["frame/trees/tiles/", "frame/ground", "frame/terrain_seen.frag"] {
+            assert!(tiles.builds(shader) && !graphics.builds(shader), "{shader}");
+        }
+        for shader in ["frame/trees/zfield.frag", "frame/trees/zfield_layers.frag", "frame/terrain.frag"] {
+            assert!(!tiles.builds(shader), "{shader}: {:?}", tiles.pipelines);
+        }
+        assert!(graphics.builds("frame/trees/zfield") && graphics.builds("frame/terrain"));
+        let plan = plan(Rasterizer::Tiles);
+        for buffer in TileBuffers::new(&plan).all() {
+            // To the next 16 bytes, and the padding of allocations.
+            let bytes = tiles.bytes(buffer.name);
+            assert!(bytes >= buffer.bytes && bytes < buffer.bytes + 4096, "{buffer:?}: {bytes}");
+            assert_eq!(graphics.bytes(buffer.name), 0, "{}", buffer.name);
+        }
+        let [with, without] =
+            [&tiles, &graphics].map(|d| ["quads seen", "first depth"].map(|n| d.bytes(n) > 0));
+        assert_eq!((with, without), ([true, layers], [false, false]));
+        // A colour a pixel, not a sample.
+        let colour = if layers { "sun part" } else { "radiance" };
+        assert!(graphics.bytes(colour) >= 4 * tiles.bytes(colour), "{:?}", graphics.allocated);
+    }
+    gpu.close().unwrap();
+}
+
+#[test]
+fn tiles_that_a_device_cannot_hold_are_refused_and_not_chosen() {
+    let gpu = device::open();
+    let scene = scene();
+    let eye = Eye::new(&scene.cameras[0], &scene.terrain, SIZE);
+    let plan =
+        |how: Drawing, info: &canopy::gpu::DeviceInfo| Plan::for_eye(&scene, &eye, false, how, Some(info));
+    let mut info = gpu.info().clone();
+    let chosen = |info: &canopy::gpu::DeviceInfo| plan(Drawing::default(), info).unwrap().rasterizer;
+    info.kind = "cpu";
+    assert_eq!(chosen(&info), Rasterizer::Tiles);
+    info.kind = "discrete";
+    assert_eq!(chosen(&info), Rasterizer::Graphics);
+    info.kind = "cpu";
+    let trees = plan(Drawing::default(), &info).unwrap().tree_capacity;
+    // The lists have three million entries; a record of a tree has eight texels.
+    let needed =
+        TileBuffers::new(&plan(Drawing::default(), &info).unwrap()).all().map(|b| b.bytes / b.texel.max(4));
+    let needed = needed.into_iter().max().unwrap() as u32;
+    assert!(needed >= 8 * trees);
+    info.max_texel_elements = needed;
+    assert_eq!(chosen(&info), Rasterizer::Tiles);
+    info.max_texel_elements = needed - 1;
+    assert_eq!(chosen(&info), Rasterizer::Graphics);
+    let refused = plan(Rasterizer::Tiles.into(), &info).unwrap_err();
+    assert!(matches!(&refused, Error::Usage(text) if text.contains("--rasterizer graphics")), "{refused}");
     gpu.close().unwrap();
 }
 
@@ -245,22 +341,28 @@ fn without_a_sun_there_is_no_light_ray_and_no_average_of_its_light() {
     let gpu = device::open();
     let mut scene = scene();
     scene.settings.set("transfer_bands", 2.0).unwrap();
-    let unreduced = planned(&gpu, &scene, Representation::Auto);
-    let (day, _) = drawn(&gpu, &scene, unreduced.clone());
+    RASTERIZERS.into_iter().for_each(|r| without_sunlight(&gpu, scene.clone(), r));
+    gpu.close().unwrap();
+}
+
+fn without_sunlight(gpu: &Gpu, mut scene: Scene, rasterizer: Rasterizer) {
+    let unreduced = planned(gpu, &scene, rasterizer);
+    let (day, _) = drawn(gpu, &scene, unreduced.clone());
+    let (passes, pipelines) = tree_drawing(rasterizer);
+    let has_trees = |d: &Drawn| passes.iter().all(|p| d.draws(p)) && pipelines.iter().all(|p| d.has(p));
     assert!(day.has("light transfer of a") && day.bytes("light transfer") > 30_000);
-    assert!(day.has("light ray of trees") && day.has("pair tables of a") && day.has("trees magnified"));
+    assert!(day.has("light ray of trees") && day.has("pair tables of a") && has_trees(&day));
     scene.sun.irradiance = [0.0; 3];
-    let (overcast, reduced) = drawn(&gpu, &scene, planned(&gpu, &scene, Representation::Auto));
+    let (overcast, reduced) = drawn(gpu, &scene, planned(gpu, &scene, rasterizer));
     assert!(!overcast.has("light ray of trees") && !overcast.has("pair tables of a"));
-    assert!(overcast.has("view tables of a") && overcast.has("trees magnified") && overcast.draws("trees"));
+    assert!(overcast.has("view tables of a") && has_trees(&overcast));
     // One texel a band stands for the transfer that nobody reads, and two for the tables.
     assert!(!overcast.has("light transfer of a") && overcast.bytes("light transfer") < 1 << 14);
     let [with, without] = [&day, &overcast].map(|d| d.bytes("pair tables"));
     assert!(without <= 1024 && with >= 6 * 6 * 18 * 8, "{with} {without}");
     assert!(overcast.planned < day.planned);
     assert!(reduced.linear.as_ref().unwrap().coverage.iter().any(|c| *c > 0.5), "no tree is seen");
-    assert!(same_light(&reduced, &picture(&gpu, &scene, unreduced)));
-    gpu.close().unwrap();
+    assert!(same_light(&reduced, &picture(gpu, &scene, unreduced)));
 }
 
 #[test]
@@ -274,7 +376,7 @@ fn level_ground_is_one_tile_without_slopes() {
     assert!(!level.builds("forest/terrain_tile.comp"), "{:?}", level.pipelines);
     assert!(reduced == picture(&gpu, &scene, Plan { height_tiles: plan.terrain_tiles, ..plan }));
     hills(&mut scene);
-    let relief = draw(&gpu, &scene);
+    let relief = draw(&gpu, &scene, Rasterizer::Tiles);
     assert!(relief.draws("terrain tiles") && relief.has("height map"));
     assert!(relief.builds("forest/terrain_tile.comp"), "{:?}", relief.pipelines);
     for name in ["slope tiles", "height tiles"] {
@@ -286,7 +388,7 @@ fn level_ground_is_one_tile_without_slopes() {
 #[test]
 fn from_afar_no_tree_is_drawn_by_itself() {
     let gpu = device::open();
-    for relief in [false, true] {
+    for (relief, rasterizer) in [false, true].into_iter().zip(RASTERIZERS) {
         let mut scene = scene();
         if relief {
             hills(&mut scene);
@@ -298,21 +400,27 @@ fn from_afar_no_tree_is_drawn_by_itself() {
         scene.settings.set("silhouette_min_pixels", 3.0).unwrap();
         scene.settings.set("zfield_min_pixels", 3.0).unwrap();
         let device = Some(gpu.info());
-        let plan =
-            |place: &[[f64; 3]]| Plan::for_path(&scene, &there, place, true, Representation::Auto, device);
+        let plan = |place: &[[f64; 3]]| Plan::for_path(&scene, &there, place, true, rasterizer, device);
         let (reduced, unreduced) = (plan(&[]).unwrap(), plan(&[here.position]).unwrap());
         assert!(!reduced.z_fields && unreduced.z_fields && reduced.last_range() < 9000.0);
         let mut far = scene.clone();
         far.cameras[0] = away;
         let ((without, image), whole) = (drawn(&gpu, &far, reduced.clone()), picture(&gpu, &far, unreduced));
-        let (with, _) = drawn(&gpu, &scene, planned(&gpu, &scene, Representation::Auto));
-        for item in ["seeds", "z-field views of a", "trees and lists", "trees", "light ray of trees"] {
+        let (with, _) = drawn(&gpu, &scene, planned(&gpu, &scene, rasterizer));
+        let (passes, pipelines) = tree_drawing(rasterizer);
+        for item in
+            ["seeds", "z-field views of a", "trees and lists", "light ray of trees"].iter().chain(pipelines)
+        {
             assert!(with.has(item) && !without.has(item), "{item}");
         }
-        for pass in ["seeds", "cull", "prefix sums", "draw commands", "compact", "trees"] {
+        for pass in ["seeds", "cull", "prefix sums", "draw commands", "compact"].iter().chain(passes) {
             assert!(with.draws(pass) && !without.draws(pass), "{pass}");
         }
-        for shader in ["forest/cull.comp", "forest/scan.comp", "forest/compact.comp", "frame/trees/zfield"] {
+        let tree_shader = match rasterizer {
+            Rasterizer::Graphics => "frame/trees/zfield",
+            Rasterizer::Tiles => "frame/trees/tiles/",
+        };
+        for shader in ["forest/cull.comp", "forest/scan.comp", "forest/compact.comp", tree_shader] {
             assert!(with.builds(shader) && !without.builds(shader), "{shader}: {:?}", without.pipelines);
         }
         for item in ["coverage tiles", "shader-map nodes", "view tables of a", "pair tables of a"] {
@@ -335,19 +443,25 @@ fn from_afar_no_tree_is_drawn_by_itself() {
 
 #[test]
 fn a_chosen_representation_needs_nothing_of_the_other() {
+    RASTERIZERS.into_iter().for_each(one_representation);
+}
+
+fn one_representation(rasterizer: Rasterizer) {
     let gpu = device::open();
     let scene = scene();
-    let auto = planned(&gpu, &scene, Representation::Auto);
+    let how = |representation| Drawing { representation, rasterizer: Some(rasterizer) };
+    let shown = tree_drawing(rasterizer).0[0];
+    let auto = planned(&gpu, &scene, how(Representation::Auto));
     assert!(auto.z_fields && auto.pair_tables);
     // Trees at any distance never converge to an average.
-    let plan = planned(&gpu, &scene, Representation::ZField);
+    let plan = planned(&gpu, &scene, how(Representation::ZField));
     let (trees, reduced) = drawn(&gpu, &scene, plan.clone());
-    assert!(trees.draws("trees") && !trees.has("pair tables of a") && trees.bytes("pair tables") <= 1024);
+    assert!(trees.draws(shown) && !trees.has("pair tables of a") && trees.bytes("pair tables") <= 1024);
     assert!(reduced == picture(&gpu, &scene, Plan { pair_tables: true, ..plan }));
     // No tree stands by itself where the shader-map shows all.
-    let plan = planned(&gpu, &scene, Representation::ShaderMap);
+    let plan = planned(&gpu, &scene, how(Representation::ShaderMap));
     let (map, reduced) = drawn(&gpu, &scene, plan.clone());
-    assert!(map.has("pair tables of a") && !map.has("seeds") && !map.draws("trees"));
+    assert!(map.has("pair tables of a") && !map.has("seeds") && !map.draws(shown));
     let Plan { seed_regions, tree_capacity, .. } = auto;
     assert!(reduced == picture(&gpu, &scene, Plan { z_fields: true, seed_regions, tree_capacity, ..plan }));
     gpu.close().unwrap();

@@ -350,7 +350,7 @@ fn near_and_far_forests_are_equally_bright() {
             sun_zenith: 40.0,
             slope: 0.0,
             distance: relative * plan.range,
-            representation: Representation::Auto,
+            drawing: Representation::Auto.into(),
             views: vec![[0.0, 0.0], [40.0, 0.0], [-40.0, 0.0], [30.0, 90.0]],
         };
         measure(&gpu, &scene, &[density], &baked, (&camera, SIZE), &method, &request, &mut || ()).unwrap()

@@ -21,7 +21,7 @@ fn subject(gpu: &Gpu) -> (Subject, CameraPath) {
          [[camera]]\nname = \"c\"\nposition = [300.0, 150.0, 20.0]\ntarget = [300.0, 400.0, 5.0]\nvertical_fov = 45.0\n",
     );
     let path = CameraPath::builtin("approach", &scene, &scene.cameras[0]).unwrap();
-    let plan = plan(&scene, &path.views(0.5).unwrap(), [160, 120], gpu).unwrap();
+    let plan = plan(&scene, &path.views(0.5).unwrap(), [160, 120], None, gpu).unwrap();
     let baked = device::bake(&scene);
     let renderer = Renderer::new(gpu, Arc::new(scene), plan, &baked).unwrap();
     (Subject { renderer, cold: Cold::default() }, path)

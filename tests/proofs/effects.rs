@@ -28,7 +28,8 @@ impl Bench {
         views: &[[f64; 2]],
     ) -> Vec<Measured> {
         let representation = Representation::Auto;
-        let request = Request { sun_zenith, slope, distance, representation, views: views.to_vec() };
+        let drawing = representation.into();
+        let request = Request { sun_zenith, slope, distance, drawing, views: views.to_vec() };
         let camera = (&self.scene.cameras[0], SIZE);
         let method = Method { patches: 2, ..Method::default() };
         measure(&self.gpu, &self.scene, &[density], &self.baked, camera, &method, &request, &mut || ())

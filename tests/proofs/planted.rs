@@ -50,6 +50,34 @@ const FAULTS: &[Fault] = &[
         to: "Some(Slot { index: index as u32, fresh: self.evicted % 7 != 6 })",
         case: "determinism/return",
     },
+    Fault {
+        name: "the last tree of a tile lost",
+        file: "shaders/frame/trees/tiles/see.glsl",
+        from: "uint count = min(end - min(begin, end), PART)",
+        to: "uint count = min(end - min(begin + 1u, end), PART)",
+        case: "tiles/above",
+    },
+    Fault {
+        name: "another row of the mask table in tiles",
+        file: "shaders/frame/trees/tiles/sight.comp",
+        from: "hash(t.identity ^ HASH_MASK) % MASK_ROWS",
+        to: "(hash(t.identity ^ HASH_MASK) + 1u) % MASK_ROWS",
+        case: "tiles/grove",
+    },
+    Fault {
+        name: "trees of tiles back to front",
+        file: "shaders/frame/trees/tiles/order_fill.comp",
+        from: "order.items[slot] = k;",
+        to: "order.items[count - 1u - slot] = k;",
+        case: "tiles/grove",
+    },
+    Fault {
+        name: "a tile done one tree early",
+        file: "shaders/frame/trees/tiles/see.glsl",
+        from: "sight_bin(records, next.tree)",
+        to: "sight_bin(records, next.tree + 1u)",
+        case: "tiles/grove",
+    },
 ];
 
 /// The sources, as git knows them, in a folder of their own.
@@ -74,7 +102,7 @@ fn copy() -> PathBuf {
 }
 
 #[test]
-#[ignore = "builds the program five times"]
+#[ignore = "builds the program nine times"]
 fn each_planted_fault_is_caught_by_a_named_case() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut missed = Vec::new();

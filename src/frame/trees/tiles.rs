@@ -13,18 +13,11 @@
 use crate::forest::cull::CullData;
 use crate::frame::Forest;
 use crate::frame::targets::ImageTargets;
-use crate::gpu::interface::{
-    BIN_LANES, DEPTH_BINS, ORDER_LANES, SIGHT_TEXELS, TILE_SIDE, TileParameters, TileState,
-};
+use crate::gpu::interface::{BIN_LANES, DEPTH_BINS, ORDER_LANES, TILE_SIDE, TileParameters, TileState};
 use crate::gpu::{Buffer, Gpu, Image, Program, Recorder, Resource, Sampler, Shader, shaders, vk};
-use crate::plan::Plan;
+use crate::plan::{Plan, TileBuffer, TileBuffers};
 use crate::scene::Scene;
 use crate::{Error, Result};
-
-/// Steps of writing the lists (trees, and entries): an invocation takes 1/64 of them, and drivers end loops after 65,535 turns.
-const STEPS: u32 = 3 << 20;
-/// Lists of a picture, at most.
-const MOST_LISTS: u32 = 16384;
 
 const WORD: (vk::Format, u64) = (vk::Format::R32_UINT, 4);
 const TWO_WORDS: (vk::Format, u64) = (vk::Format::R32G32_UINT, 8);
@@ -67,13 +60,14 @@ impl TreeTiles {
     /// [`Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, mask_rows: u32) -> Result<Self> {
         let s = &scene.settings;
-        let shift =
-            (3..).find(|k| plan.size.iter().map(|n| n.div_ceil(1 << k)).product::<u32>() <= MOST_LISTS);
-        let shift = shift.unwrap_or(3);
-        let lists = plan.size.map(|n| n.div_ceil(1 << shift));
-        let list_count = u64::from(lists[0] * lists[1]);
-        let trees = u64::from(plan.tree_capacity);
-        let samples = u64::from(plan.size[0]) * u64::from(plan.size[1]) * u64::from(plan.samples);
+        let sizes = TileBuffers::new(plan);
+        let make = |b: &TileBuffer| match b.texel {
+            0 => gpu.buffer(b.name, b.bytes),
+            4 => gpu.texel_buffer(b.name, b.bytes, WORD),
+            8 => gpu.texel_buffer(b.name, b.bytes, TWO_WORDS),
+            _ => gpu.texel_buffer(b.name, b.bytes, FOUR_WORDS),
+        };
+        let lists = sizes.lists;
         let resolution = (s.view_resolution as f32).to_bits();
         let before = s.view_iterations - 1;
         let see: &'static Shader = if plan.samples > 1 {
@@ -85,24 +79,24 @@ impl TreeTiles {
             parameters: TileParameters {
                 size: plan.size,
                 lists_across: lists[0],
-                list_shift: shift,
+                list_shift: sizes.list_shift,
                 near: crate::camera::NEAR_PLANE as f32,
-                step_capacity: STEPS,
+                step_capacity: plan.tile_steps,
             },
             list_parts: lists[0] * lists[1] * BIN_LANES,
             tiles: plan.size.map(|n| n.div_ceil(TILE_SIDE)),
-            keys: gpu.buffer("tree depth bins", trees * 4)?,
-            depth_counts: gpu.buffer("depth counts", 4 + 4 * u64::from(DEPTH_BINS * ORDER_LANES))?,
-            order: gpu.buffer("trees front to back", trees * 4)?,
-            records: gpu.texel_buffer("tree sights", trees * 16 * u64::from(SIGHT_TEXELS), FOUR_WORDS)?,
-            boxes: gpu.texel_buffer("tree boxes", trees * 8, TWO_WORDS)?,
-            ranked: gpu.texel_buffer("trees by rank", trees * 4, WORD)?,
-            spans: gpu.buffer("tree spans", 4 + trees * 4)?,
-            list_counts: gpu.texel_buffer("list ends", 4 + 4 * list_count * u64::from(BIN_LANES), WORD)?,
-            entries: gpu.texel_buffer("list entries", 4 * u64::from(STEPS), WORD)?,
-            state: gpu.buffer("tile state", size_of::<TileState>() as u64)?,
-            seen: gpu.texel_buffer("trees seen", 4 * samples, WORD)?,
-            depths: gpu.buffer("depths seen", 4 * samples)?,
+            keys: make(&sizes.keys)?,
+            depth_counts: make(&sizes.depth_counts)?,
+            order: make(&sizes.order)?,
+            records: make(&sizes.records)?,
+            boxes: make(&sizes.boxes)?,
+            spans: make(&sizes.spans)?,
+            ranked: make(&sizes.ranked)?,
+            list_counts: make(&sizes.list_counts)?,
+            entries: make(&sizes.entries)?,
+            state: make(&sizes.state)?,
+            seen: make(&sizes.seen)?,
+            depths: make(&sizes.depths)?,
             order_count: gpu.compute(&shaders::FRAME_TREES_TILES_ORDER_COUNT_COMP, &[])?,
             order_fill: gpu.compute(&shaders::FRAME_TREES_TILES_ORDER_FILL_COMP, &[])?,
             scan: gpu.compute(&shaders::FRAME_TREES_TILES_SCAN_COMP, &[])?,

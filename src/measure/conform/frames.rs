@@ -6,18 +6,28 @@ use std::sync::Arc;
 use super::scenes::{self, SIZE, SceneCase};
 use super::{Finding, Options, finding};
 use crate::bake::{Baked, load_or_bake_scene};
-use crate::camera::auto_exposure;
+use crate::camera::{Eye, auto_exposure};
 use crate::frame::Renderer;
 use crate::gpu::Gpu;
 use crate::image::Picture;
-use crate::plan::{Plan, ViewMode};
+use crate::plan::{Plan, Rasterizer, ViewMode};
 use crate::scene::{Camera, Scene};
 use crate::{Error, Result};
 
+/// Both ways of finding samples: what must hold of a frame must hold of each.
+pub(super) const RASTERIZERS: [Rasterizer; 2] = [Rasterizer::Graphics, Rasterizer::Tiles];
+
 /// A renderer of a scene of the suite, with its camera and exposure.
-fn renderer(gpu: &Gpu, options: &Options, case: &SceneCase, layers: bool) -> Result<(Renderer, Camera, f64)> {
+fn renderer(
+    gpu: &Gpu,
+    options: &Options,
+    case: &SceneCase,
+    rasterizer: Rasterizer,
+    layers: bool,
+) -> Result<(Renderer, Camera, f64)> {
     let (scene, camera) = case.load()?;
-    let mut plan = Plan::new(&scene, &camera, SIZE, layers, Some(gpu.info()))?;
+    let eye = Eye::new(&camera, &scene.terrain, SIZE);
+    let mut plan = Plan::for_eye(&scene, &eye, layers, rasterizer, Some(gpu.info()))?;
     plan.view_mode = case.mode;
     let exposure = auto_exposure(&scene);
     let baked = bakes(&scene, options)?;
@@ -30,21 +40,40 @@ fn bakes(scene: &Scene, options: &Options) -> Result<Vec<Baked>> {
 }
 
 /// Draws a scene of the suite; the second frame, with everything in the caches, must be the same.
-pub(super) fn draw(gpu: &Gpu, options: &Options, case: &SceneCase, layers: bool) -> Result<Picture> {
+pub(super) fn draw(
+    gpu: &Gpu,
+    options: &Options,
+    case: &SceneCase,
+    rasterizer: Rasterizer,
+    layers: bool,
+) -> Result<Picture> {
     let (mut renderer, camera, exposure) =
-        renderer(gpu, options, case, layers && case.mode == ViewMode::Radiance)?;
+        renderer(gpu, options, case, rasterizer, layers && case.mode == ViewMode::Radiance)?;
     renderer.render(&camera, exposure)?;
     let first = renderer.picture()?;
     renderer.render(&camera, exposure)?;
     if renderer.picture()? != first {
-        return Err(Error::Check(format!("{}: a second frame differs from the first", case.name)));
+        let by = rasterizer.name();
+        return Err(Error::Check(format!("{}, {by}: a second frame differs from the first", case.name)));
     }
     Ok(first)
 }
 
-/// Numbers that are numbers, fractions that sum to what is not background, and no more light than there is.
+/// What must hold of a frame, by each rasteriser.
 pub(super) fn check(gpu: &Gpu, options: &Options, case: &SceneCase) -> Result<Finding> {
-    let picture = draw(gpu, options, case, true)?;
+    let (mut problems, mut measured) = (Vec::new(), Vec::new());
+    for rasterizer in RASTERIZERS {
+        let picture = draw(gpu, options, case, rasterizer, true)?;
+        let (wrong, found) = laws(case, &picture)?;
+        problems.extend(wrong.into_iter().map(|p| format!("{}: {p}", rasterizer.name())));
+        measured.push(format!("{}: {found}", rasterizer.name()));
+    }
+    Ok(finding(&problems, measured.join("; ")))
+}
+
+/// Numbers that are numbers, fractions that sum to what is not background, and no more light than there is: what does not hold,
+/// and what was measured.
+fn laws(case: &SceneCase, picture: &Picture) -> Result<(Vec<String>, String)> {
     let Some(l) = &picture.linear else {
         return Err(Error::Usage(format!("{}: a view mode has no linear image", case.name)));
     };
@@ -86,10 +115,8 @@ pub(super) fn check(gpu: &Gpu, options: &Options, case: &SceneCase) -> Result<Fi
     if trees < 0.02 {
         problems.push(format!("trees are only {trees:.4} of the picture"));
     }
-    Ok(finding(
-        &problems,
-        format!("trees {trees:.3} of the picture, fractions within {:.1e} of 1", off.max(short)),
-    ))
+    let measured = format!("trees {trees:.3} of the picture, fractions within {:.1e} of 1", off.max(short));
+    Ok((problems, measured))
 }
 
 /// The scene of determinism: every pass is in it.
@@ -97,16 +124,44 @@ const DETERMINISM: &str = "hills";
 
 /// Another renderer draws the same bits.
 pub(super) fn again(gpu: &Gpu, options: &Options) -> Result<Finding> {
-    let case = scenes::find(DETERMINISM)?;
-    let (a, b) = (draw(gpu, options, case, true)?, draw(gpu, options, case, true)?);
-    let problem = (a != b).then(|| "two renderers draw other bits".to_string());
-    Ok(finding(problem.as_slice(), a.digest()[..16].into()))
+    let [a, b] = [digests(gpu, options, DETERMINISM)?, digests(gpu, options, DETERMINISM)?];
+    let problem = (a != b).then(|| format!("two renderers draw other bits: {}, {}", short(&a), short(&b)));
+    Ok(finding(problem.as_slice(), short(&a)))
+}
+
+/// The bits of a scene's frame by each rasteriser, as hashes.
+pub(super) fn digests(gpu: &Gpu, options: &Options, scene: &str) -> Result<[String; 2]> {
+    let case = scenes::find(scene)?;
+    let [graphics, tiles] = RASTERIZERS.map(|r| draw(gpu, options, case, r, true).map(|p| p.digest()));
+    Ok([graphics?, tiles?])
+}
+
+/// The beginnings of hashes, for reports.
+fn short(digests: &[String; 2]) -> String {
+    digests.each_ref().map(|d| &d[..16]).join(" ")
 }
 
 /// After a flight elsewhere, with tiles thrown out and made again, the first view is the same bits as before: no tile in the
 /// caches is stale.
 pub(super) fn return_flight(gpu: &Gpu, options: &Options) -> Result<Finding> {
-    let (mut renderer, camera, exposure) = renderer(gpu, options, scenes::find(DETERMINISM)?, true)?;
+    let (mut problems, mut made) = (Vec::new(), 0);
+    for rasterizer in RASTERIZERS {
+        let (same, produced) = returns(gpu, options, rasterizer)?;
+        if !same {
+            problems.push(format!("{}: after a flight the first view has other bits", rasterizer.name()));
+        }
+        if produced == 0 {
+            problems.push("the flight made no tile: it proves nothing".into());
+        }
+        made += produced;
+    }
+    Ok(finding(&problems, format!("{made} coverage tiles made on the way")))
+}
+
+/// Whether the first view has the same bits after a flight, and how many coverage tiles that made.
+fn returns(gpu: &Gpu, options: &Options, rasterizer: Rasterizer) -> Result<(bool, u32)> {
+    let case = scenes::find(DETERMINISM)?;
+    let (mut renderer, camera, exposure) = renderer(gpu, options, case, rasterizer, true)?;
     renderer.render(&camera, exposure)?;
     let before = renderer.picture()?;
     let mut made = 0;
@@ -119,19 +174,13 @@ pub(super) fn return_flight(gpu: &Gpu, options: &Options) -> Result<Finding> {
         made += renderer.render(&there, exposure)?.produced.coverage;
     }
     renderer.render(&camera, exposure)?;
-    let mut problems = Vec::new();
-    if renderer.picture()? != before {
-        problems.push("after a flight the first view has other bits".to_string());
-    }
-    if made == 0 {
-        problems.push("the flight made no tile: it proves nothing".into());
-    }
-    Ok(finding(&problems, format!("{made} coverage tiles made on the way")))
+    Ok((renderer.picture()? == before, made))
 }
 
 /// A process with another number of driver threads draws the same bits as this one.
 pub(super) fn threads(gpu: &Gpu, options: &Options, threads: &str) -> Result<Finding> {
-    let here = draw(gpu, options, scenes::find(DETERMINISM)?, true)?.digest();
+    let digests = digests(gpu, options, DETERMINISM)?;
+    let here = digests.join(" ");
     let mut command = Command::new(&options.program);
     command.args(["conform", "--digest", DETERMINISM]).env("LP_NUM_THREADS", threads);
     if let Some(device) = &options.device {
@@ -147,5 +196,5 @@ pub(super) fn threads(gpu: &Gpu, options: &Options, threads: &str) -> Result<Fin
     } else {
         (there != here).then(|| format!("LP_NUM_THREADS={threads} draws other bits: {there}, here {here}"))
     };
-    Ok(finding(problem.as_slice(), here[..16].into()))
+    Ok(finding(problem.as_slice(), short(&digests)))
 }

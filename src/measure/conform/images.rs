@@ -6,6 +6,7 @@ use super::scenes::{SIZE, SceneCase};
 use super::{Finding, Suite, driver_key, finding, frames, with_device};
 use crate::image::png;
 use crate::measure::metrics::flip;
+use crate::plan::Rasterizer;
 use crate::{Error, Result};
 
 /// Largest mean FLIP against a reference of the same driver build. Its images are the same to the bit on one processor; the
@@ -33,7 +34,7 @@ pub(super) fn check(suite: &Suite, case: &SceneCase) -> Result<Finding> {
     let options = &suite.options;
     let mut drawn = None;
     with_device(options, |gpu| {
-        drawn = Some(frames::draw(gpu, options, case, false)?);
+        drawn = Some(frames::draw(gpu, options, case, Rasterizer::Graphics, false)?);
         Ok(finding(&[], String::new()))
     })?;
     let Some(picture) = drawn else { return Err(Error::Check("nothing was drawn".into())) };
@@ -90,7 +91,7 @@ fn reference(suite: &Suite, own: &std::path::Path, file: &str) -> Result<Option<
     }))
 }
 
-fn encode(rgb: &[u8]) -> Result<Vec<u8>> {
+pub(super) fn encode(rgb: &[u8]) -> Result<Vec<u8>> {
     png(rgb, SIZE).map_err(|e| Error::Check(format!("cannot encode a picture: {e}")))
 }
 

@@ -1,8 +1,9 @@
 //! Conformance: does this driver draw what canopy means? Small scenes and function probes, each a named case.
 //!
-//! - `image/…`: a picture against the reference of this driver by FLIP; on a driver without references of its own, against the
+//! - `image/…`: a picture of the graphics pipeline against the reference of this driver by FLIP; on a driver without references of its own, against the
 //!   nearest one's, loosely.
-//! - `frame/…`: what must hold of the same scenes on any driver: every number finite, fractions that sum to one, no light
+//! - `tiles/…`: the picture of compute tiles against that of the graphics pipeline, both drawn there and then.
+//! - `frame/…`: what must hold of the same scenes on any driver, by either rasteriser: every number finite, fractions that sum to one, no light
 //!   from nowhere.
 //! - `probe/…`: shader functions against their twins in double precision; the coverage law of sample masks.
 //! - `determinism/…`: the same bits from another renderer, after a flight, and for any number of driver threads.
@@ -15,6 +16,7 @@ mod law;
 pub mod probe;
 mod report;
 mod scenes;
+mod tiles;
 mod validation;
 
 use std::path::{Path, PathBuf};
@@ -54,6 +56,7 @@ pub struct Case {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Image(usize),
+    Tiles(usize),
     Frame(usize),
     Probe(usize),
     Threads(&'static str),
@@ -132,6 +135,7 @@ pub fn cases() -> Vec<Case> {
     let case = |kind: &str, name: &str, k: Kind| Case { name: format!("{kind}/{name}"), kind: k };
     let scenes = || scenes::ALL.iter().enumerate();
     let mut all: Vec<Case> = scenes().map(|(k, s)| case("image", s.name, Kind::Image(k))).collect();
+    all.extend(scenes().map(|(k, s)| case("tiles", s.name, Kind::Tiles(k))));
     let radiance = scenes().filter(|(_, s)| s.mode == ViewMode::Radiance);
     all.extend(radiance.map(|(k, s)| case("frame", s.name, Kind::Frame(k))));
     all.extend(probe::ALL.iter().enumerate().map(|(k, p)| case("probe", p.0, Kind::Probe(k))));
@@ -218,6 +222,7 @@ impl Suite {
         let o = &self.options;
         match case.kind {
             Kind::Image(k) => images::check(self, &scenes::ALL[k]),
+            Kind::Tiles(k) => tiles::check(o, &scenes::ALL[k]),
             Kind::Frame(k) => with_device(o, |gpu| frames::check(gpu, o, &scenes::ALL[k])),
             Kind::Probe(k) => with_device(o, |gpu| probe::ALL[k].1(gpu)),
             Kind::Again => with_device(o, |gpu| frames::again(gpu, o)),
@@ -228,16 +233,15 @@ impl Suite {
     }
 }
 
-/// The bits of a scene's frame as a hash: what a process of its own prints for `determinism/threads-…`.
+/// The bits of a scene's frame by each rasteriser as hashes: what a process of its own prints for `determinism/threads-…`.
 ///
 /// # Errors
 /// [`Error::Usage`] for a scene that is not in the suite, and what drawing it meets.
 pub fn digest(options: &Options, scene: &str) -> Result<String> {
-    let scene = scenes::find(scene)?;
     let gpu = Gpu::new(&GpuOptions { device: options.device.clone(), ..Default::default() })?;
-    let digest = frames::draw(&gpu, options, scene, true)?.digest();
+    let digests = frames::digests(&gpu, options, scene)?;
     gpu.close()?;
-    Ok(digest)
+    Ok(digests.join(" "))
 }
 
 /// Opens a device for one case; closing reports what it left behind.

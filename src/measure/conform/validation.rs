@@ -39,14 +39,16 @@ pub(super) fn check(options: &Options, (_, validation, hint): &Watch) -> Result<
         if few { (&SCENES[..1], &[true]) } else { (&SCENES, &[false, true]) };
     let mut frames_drawn = 0;
     for scene in scenes::ALL.iter().filter(|s| scenes.contains(&s.name)) {
-        for layers in targets.iter().copied() {
+        for (layers, rasterizer) in targets.iter().flat_map(|l| frames::RASTERIZERS.map(|r| (*l, r))) {
             let gpu = open()?;
-            let drawn = frames::draw(&gpu, options, scene, layers);
+            let drawn = frames::draw(&gpu, options, scene, rasterizer, layers);
             let said = gpu.messages();
             // What the layers say comes first: it may be why the drawing failed.
             match (said.is_empty(), drawn) {
-                (false, _) => problems.push(format!("{}: {}", scene.name, said.join("; "))),
-                (true, Err(e)) => problems.push(format!("{}: {e}", scene.name)),
+                (false, _) => {
+                    problems.push(format!("{}, {}: {}", scene.name, rasterizer.name(), said.join("; ")))
+                }
+                (true, Err(e)) => problems.push(format!("{}, {}: {e}", scene.name, rasterizer.name())),
                 (true, Ok(_)) => frames_drawn += 2,
             }
         }

@@ -18,11 +18,19 @@ pub struct Subject {
     pub size: [u32; 2],
     /// Which device.
     pub device: DeviceIdentity,
+    /// By which rasteriser, where one was chosen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rasterizer: Option<String>,
 }
 
 impl From<&Identity> for Subject {
     fn from(i: &Identity) -> Self {
-        Subject { scene: i.scene.clone(), size: i.size, device: i.device.clone() }
+        Subject {
+            scene: i.scene.clone(),
+            size: i.size,
+            device: i.device.clone(),
+            rasterizer: i.rasterizer.clone(),
+        }
     }
 }
 
@@ -64,7 +72,7 @@ pub struct Choice {
     pub cpu: String,
     /// Device that it was measured on.
     pub device: String,
-    /// In what it differs from what is drawn now: `scene`, `device`; the time then says less.
+    /// In what it differs from what is drawn now: `scene`, `device`, `rasterizer`; the time then says less.
     pub differs: Vec<&'static str>,
     /// Every knob.
     #[serde(skip)]
@@ -89,7 +97,11 @@ pub fn choose(file: &Path, subject: &Subject, budget_ms: f64) -> Result<Choice> 
             format!("render with --size {w}x{h}, or sweep the size that you want"),
         ));
     }
-    let differs = [("scene", swept.scene != subject.scene), ("device", swept.device != subject.device)];
+    let differs = [
+        ("scene", swept.scene != subject.scene),
+        ("device", swept.device != subject.device),
+        ("rasterizer", swept.rasterizer != subject.rasterizer),
+    ];
     let (point, row): (&Point, Row) = fit(&result, budget_ms).ok_or_else(|| {
         let least = least_ms(&result).map_or("nothing was measured".into(), |ms| format!("the fastest takes {ms:.1} ms"));
         Error::Usage(format!(

@@ -49,6 +49,9 @@ pub struct Identity {
     pub most_accurate: Settings,
     /// Knobs that are swept, those with values of their own as `samples=1/4`.
     pub knobs: Vec<String>,
+    /// What finds the samples of trees, where it was chosen: `graphics` or `tiles`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rasterizer: Option<String>,
     /// Frames of each camera and setting that are timed, the first of which only warms up.
     pub rounds: u32,
     /// Which device.

@@ -19,7 +19,7 @@ use crate::measure::metrics::{
 use crate::measure::path::CameraPath;
 use crate::measure::results::{BenchResult, SceneIdentity};
 use crate::measure::statistics::{block_bootstrap, median};
-use crate::plan::{Plan, Representation};
+use crate::plan::{Drawing, Plan, Rasterizer};
 use crate::scene::{Camera, Scene};
 use crate::settings::{Knob, Settings};
 use crate::{Error, Result};
@@ -55,6 +55,8 @@ pub struct Request {
     pub product: usize,
     /// A reference for each camera, with a hash of its file; or none at all.
     pub references: Vec<(Layers, String)>,
+    /// What finds the samples of trees; `None`: what suits the device.
+    pub rasterizer: Option<Rasterizer>,
     /// Bakes on disk.
     pub cache: Option<PathBuf>,
     /// The device is watched by the validation layers; for the report only.
@@ -151,6 +153,7 @@ fn empty(gpu: &Gpu, request: &Request, finest: &Settings) -> Result<SweepResult>
         presets: request.presets.clone(),
         most_accurate: finest.clone(),
         knobs: request.knobs.iter().map(Swept::label).collect(),
+        rasterizer: request.rasterizer.map(|r| r.name().into()),
         rounds: request.rounds,
         device: gpu.info().into(),
         cpu: (host.cpu.clone(), host.threads),
@@ -228,7 +231,7 @@ impl Runner<'_> {
         let kept = self.base.take().filter(|(name, _)| *name == setting.base && !own_base);
         let build = |settings: &Settings| {
             let scene = self.scene(settings);
-            let plan = bench::plan(&scene, &views, self.request.size, self.gpu)?;
+            let plan = bench::plan(&scene, &views, self.request.size, self.request.rasterizer, self.gpu)?;
             Subject::new(self.gpu, scene, plan, self.request.cache.as_deref(), self.request.quiet)
         };
         let mut base = match kept {
@@ -264,7 +267,8 @@ impl Runner<'_> {
         }
         let [eye, there] = [camera, &nearer].map(|c| Eye::new(c, &scene.terrain, self.request.size));
         let device = Some(self.gpu.info());
-        let plan = Plan::for_path(&scene, &eye, &[there.position], true, Representation::Auto, device)?;
+        let drawing = Drawing { rasterizer: self.request.rasterizer, ..Default::default() };
+        let plan = Plan::for_path(&scene, &eye, &[there.position], true, drawing, device)?;
         let exposure = auto_exposure(&scene);
         let cache = self.request.cache.as_deref();
         let mut renderer = Subject::new(self.gpu, scene, plan, cache, self.request.quiet)?.renderer;

@@ -1,0 +1,235 @@
+//! What finds the samples of trees, and what compute tiles take for that.
+
+use super::{Plan, Representation};
+use crate::gpu::DeviceInfo;
+use crate::gpu::interface::{BIN_LANES, DEPTH_BINS, ORDER_LANES, SIGHT_TEXELS, TileState};
+use crate::{Error, Result};
+
+/// Steps of writing the lists (trees, and entries): an invocation takes 1/64 of them, and drivers end loops after 65,535 turns.
+pub const TILE_STEPS: u32 = 3 << 20;
+/// Lists of a picture, at most.
+const MOST_LISTS: u32 = 16384;
+
+/// Pipelines of the tiles that find and light trees.
+pub(super) const TREE_PIPELINES: [(&str, &str); 6] = [
+    ("tree order", "trees of the tiles, sorted front to back"),
+    ("tree sights", "what finding a tree's samples takes, once a tree"),
+    ("tile lists", "which trees may be seen in which square of pixels"),
+    ("tiles", "the tree that each sample sees before the ground"),
+    ("tree light", "light on trees, once a pixel and tree that it sees"),
+    ("tile sums", "prefix sums of the tiles' counts"),
+];
+/// Passes of the tiles that find trees.
+pub(super) const TREE_PASSES: [(&str, &str); 5] = [
+    ("tree order", "trees in view front to back, so that tiles may stop early"),
+    ("tree sights", "what finding a tree's samples takes, once a tree"),
+    ("list counts", "no entries yet"),
+    ("tile lists", "which trees may be seen in which square of pixels"),
+    ("tiles", "the tree that each sample sees before the ground"),
+];
+
+/// What finds the samples of trees that are drawn one by one, and whether the ground is lit as it is drawn or where it is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rasterizer {
+    /// The graphics pipeline: a quad a tree, every fragment lit.
+    Graphics,
+    /// Compute tiles: front to back, visibility first, then each pixel's trees lit once.
+    Tiles,
+}
+
+impl Rasterizer {
+    /// All, with the names that users write; `None` leaves the choice to the plan: tiles where the device is a CPU, on which the
+    /// layers of trees behind each other cost most, and can hold what tiles read; else the graphics pipeline.
+    pub const NAMES: [(&'static str, Option<Rasterizer>); 3] =
+        [("auto", None), ("graphics", Some(Rasterizer::Graphics)), ("tiles", Some(Rasterizer::Tiles))];
+
+    /// The name that users write.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(_, r)| *r == Some(self)).map_or("", |(n, _)| n)
+    }
+}
+
+/// How a picture's trees are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Drawing {
+    /// What stands for a tree.
+    pub representation: Representation,
+    /// What finds its samples; `None`: what suits the device (see [`Rasterizer::NAMES`]).
+    pub rasterizer: Option<Rasterizer>,
+}
+
+impl From<Representation> for Drawing {
+    fn from(representation: Representation) -> Self {
+        Drawing { representation, rasterizer: None }
+    }
+}
+
+impl From<Rasterizer> for Drawing {
+    fn from(rasterizer: Rasterizer) -> Self {
+        Drawing { representation: Representation::default(), rasterizer: Some(rasterizer) }
+    }
+}
+
+/// A buffer of the tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileBuffer {
+    /// Name, as in captures and reports.
+    pub name: &'static str,
+    /// Bytes.
+    pub bytes: u64,
+    /// Bytes of a texel, where shaders read it as texels; else 0.
+    pub texel: u64,
+    /// What needs it.
+    reason: &'static str,
+}
+
+/// What compute tiles take for trees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileBuffers {
+    /// log2 of the pixels along a side of a square that has a list.
+    pub list_shift: u32,
+    /// Lists along a row and down a column.
+    pub lists: [u32; 2],
+    /// Bin of depth of each tree.
+    pub keys: TileBuffer,
+    /// Trees a bin and invocation.
+    pub depth_counts: TileBuffer,
+    /// Trees front to back.
+    pub order: TileBuffer,
+    /// A record a tree, front to back.
+    pub records: TileBuffer,
+    /// A box a tree, front to back.
+    pub boxes: TileBuffer,
+    /// Steps before each tree's first.
+    pub spans: TileBuffer,
+    /// Which tree each of them is.
+    pub ranked: TileBuffer,
+    /// Where each part of a list ends.
+    pub list_counts: TileBuffer,
+    /// Trees of the lists.
+    pub entries: TileBuffer,
+    /// What the passes find.
+    pub state: TileBuffer,
+    /// Tree that each sample sees.
+    pub seen: TileBuffer,
+    /// And how deep, for lists of several parts.
+    pub depths: TileBuffer,
+}
+
+impl TileBuffers {
+    /// For a plan's image and trees.
+    pub fn new(plan: &Plan) -> Self {
+        let lists_of = |shift: u32| plan.size.map(|n| n.div_ceil(1 << shift));
+        let few = |shift: &u32| {
+            let [across, down] = lists_of(*shift);
+            across.checked_mul(down).is_some_and(|n| n <= MOST_LISTS)
+        };
+        let list_shift = (3..32).find(few).unwrap_or(31);
+        let lists = lists_of(list_shift);
+        let list_parts = u64::from(lists[0] * lists[1] * BIN_LANES);
+        let trees = u64::from(plan.tree_capacity);
+        let samples = u64::from(plan.size[0]) * u64::from(plan.size[1]) * u64::from(plan.samples);
+        let buffer = |name, bytes, texel, reason| TileBuffer { name, bytes, texel, reason };
+        TileBuffers {
+            list_shift,
+            lists,
+            keys: buffer("tree depth bins", trees * 4, 0, "depth of every tree in view"),
+            depth_counts: buffer(
+                "depth counts",
+                4 + 4 * u64::from(DEPTH_BINS * ORDER_LANES),
+                0,
+                "sorting trees by depth without atomics",
+            ),
+            order: buffer("trees front to back", trees * 4, 0, "trees in view in the order of depth"),
+            records: buffer(
+                "tree sights",
+                trees * 16 * u64::from(SIGHT_TEXELS),
+                16,
+                "what finding a tree's samples takes",
+            ),
+            boxes: buffer("tree boxes", trees * 8, 8, "where on the screen a tree may be"),
+            spans: buffer("tree spans", 4 + trees * 4, 0, "in how many lists a tree is"),
+            ranked: buffer("trees by rank", trees * 4, 4, "which tree a record is of"),
+            list_counts: buffer(
+                "list ends",
+                4 + 4 * list_parts,
+                4,
+                "where the lists of squares of pixels end",
+            ),
+            entries: buffer(
+                "list entries",
+                4 * u64::from(plan.tile_steps.max(1)),
+                4,
+                "the trees of each square of pixels, front to back",
+            ),
+            state: buffer("tile state", size_of::<TileState>() as u64, 0, "how many trees there are"),
+            seen: buffer("trees seen", 4 * samples, 4, "the tree that each sample sees"),
+            depths: buffer("depths seen", 4 * samples, 0, "depth of samples, between parts of long lists"),
+        }
+    }
+
+    /// Every buffer, in the order of allocation.
+    pub fn all(&self) -> [&TileBuffer; 12] {
+        [
+            &self.keys,
+            &self.depth_counts,
+            &self.order,
+            &self.records,
+            &self.boxes,
+            &self.spans,
+            &self.ranked,
+            &self.list_counts,
+            &self.entries,
+            &self.state,
+            &self.seen,
+            &self.depths,
+        ]
+    }
+
+    /// What of it a device does not take; empty if it takes all.
+    fn beyond(&self, device: &DeviceInfo) -> Option<String> {
+        let texels = u64::from(device.max_texel_elements);
+        self.all().into_iter().find_map(|b| {
+            if b.texel > 0 && b.bytes / b.texel > texels {
+                let wanted = b.bytes / b.texel;
+                return Some(format!(
+                    "\"{}\" has {wanted} texels, and shaders read {texels} at most",
+                    b.name
+                ));
+            }
+            (b.bytes > device.max_storage_bytes)
+                .then(|| format!("\"{}\" is larger than a storage buffer may be", b.name))
+        })
+    }
+}
+
+impl TileBuffer {
+    /// As an item of a plan: name, reason and bytes.
+    pub(super) fn item(&self) -> (&'static str, String, u64) {
+        (self.name, self.reason.to_string(), self.bytes)
+    }
+}
+
+impl Plan {
+    /// Takes a rasteriser, or the one that suits the device.
+    pub(super) fn choose_rasterizer(
+        &mut self,
+        wanted: Option<Rasterizer>,
+        device: Option<&DeviceInfo>,
+    ) -> Result<()> {
+        let beyond = device.and_then(|d| TileBuffers::new(self).beyond(d));
+        let cpu = device.is_none_or(|d| d.kind == "cpu");
+        self.rasterizer = match (wanted, beyond) {
+            (Some(Rasterizer::Tiles), Some(why)) => {
+                return Err(Error::Usage(format!(
+                    "--rasterizer tiles: {why} on this device: draw fewer trees or a smaller picture, or use --rasterizer graphics"
+                )));
+            }
+            (Some(rasterizer), _) => rasterizer,
+            (None, None) if cpu => Rasterizer::Tiles,
+            (None, _) => Rasterizer::Graphics,
+        };
+        Ok(())
+    }
+}
