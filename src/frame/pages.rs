@@ -87,7 +87,7 @@ impl PageSet {
 /// First and last page of a cascade's square that a box reaches into, with a margin in texels.
 fn pages_of(cascade: &Cascade, bounds: &Bounds, margin: f64) -> Option<[[usize; 2]; 2]> {
     let g = &cascade.grid;
-    let mut pages = [[0; 2]; 2];
+    let (mut first, mut last) = ([0; 2], [0; 2]);
     for k in 0..2 {
         let reach = |low: bool| -> f64 {
             let least = |i: usize| (g.axes[k][i] > 0.0) == low;
@@ -98,10 +98,9 @@ fn pages_of(cascade: &Cascade, bounds: &Bounds, margin: f64) -> Option<[[usize; 
         if high < 0.0 || low >= SIDE as f64 {
             return None;
         }
-        pages[0][k] = low.max(0.0) as usize;
-        pages[1][k] = high.min(SIDE as f64 - 1.0) as usize;
+        (first[k], last[k]) = (low.max(0.0) as usize, high.min(SIDE as f64 - 1.0) as usize);
     }
-    Some(pages)
+    Some([first, last])
 }
 
 /// What an image holds of the maps: by cascade, the map and the page at each place.
@@ -268,7 +267,8 @@ mod tests {
     fn pages_are_drawn_once_while_the_square_moves_and_again_when_the_map_changes() {
         let mut held = Held::default();
         let all = PageSet { rows: [u64::MAX; SIDE] };
-        let mut fresh = |c: &Cascade| count(&held.take(&[c.clone()], &[all.clone()])[0]);
+        let all = std::slice::from_ref(&all);
+        let mut fresh = |c: &Cascade| count(&held.take(std::slice::from_ref(c), all)[0]);
         let mut c = cascade([-400, 84]);
         assert_eq!((fresh(&c), fresh(&c)), (4096, 0));
         c.first = [-392, 80];
@@ -290,13 +290,13 @@ mod tests {
             let mut seen = PageSet::default();
             for (b, pages) in blocks(&c, &all) {
                 assert_eq!(i64::from(count(&pages)), (b.last[0] - b.first[0]) * (b.last[1] - b.first[1]));
-                for k in 0..2 {
+                for (k, first) in first.into_iter().enumerate() {
                     assert!(
                         b.origin[k] % 256 == 0
                             && (0..64).contains(&b.first[k])
                             && (1..=64).contains(&b.last[k])
                     );
-                    assert_eq!(b.origin[k], first[k] + 4 * b.shift[k]);
+                    assert_eq!(b.origin[k], first + 4 * b.shift[k]);
                 }
                 for y in b.first[1]..b.last[1] {
                     for x in b.first[0]..b.last[0] {

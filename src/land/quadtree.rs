@@ -332,7 +332,7 @@ mod tests {
 
     #[test]
     fn cells_are_found_as_if_each_were_asked() {
-        let wanted = |x: u32, y: u32| (x * 7 + y * 3) % 11 == 0 || (x == 36 && y == 4);
+        let wanted = |x: u32, y: u32| (x * 7 + y * 3).is_multiple_of(11) || (x == 36 && y == 4);
         let keep = |low: [u32; 2], high: [u32; 2]| {
             (low[1]..high[1]).any(|y| (low[0]..high[0]).any(|x| wanted(x, y)))
         };

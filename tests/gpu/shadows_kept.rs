@@ -25,7 +25,7 @@ fn at(position: [f64; 3], target: [f64; 3]) -> Moment {
 }
 
 fn draw(renderer: &mut Renderer, scene: &Scene, moment: &Moment) -> FrameReport {
-    renderer.set_sun(canopy::scene::Sun { azimuth: moment.azimuth, ..scene.sun.clone() }).unwrap();
+    renderer.set_sun(canopy::scene::Sun { azimuth: moment.azimuth, ..scene.sun }).unwrap();
     renderer.render(&moment.camera, 1.0).unwrap()
 }
 
