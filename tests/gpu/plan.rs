@@ -128,7 +128,7 @@ fn without_a_sun(rasterizer: Rasterizer) {
         let mut relief = scene.clone();
         relief.sun = self::scene().sun;
         hills(&mut relief);
-        assert!(draw(&gpu, &relief).builds("frame/terrain_shadow.frag"));
+        assert!(draw(&gpu, &relief, rasterizer).builds("frame/terrain_shadow.frag"));
         // One texel stands for the map that nobody reads.
         assert!(night.bytes("shadow cascades") < 1 << 16 && night.bytes("shadow depth") == 0);
         assert!(night.planned < day.planned);
