@@ -45,7 +45,8 @@ impl Search<'_> {
         let reached: Vec<usize> = (0..self.cascades.len()).filter(within).collect();
         let Some(finest) = reached.first() else { return };
         let grid = &self.cascades[*finest].grid;
-        let enough = PAGES * grid.page() as f64 * grid.texel;
+        // Boxes are as high as trees: parts much narrower than that tell no more.
+        let enough = (PAGES * grid.page() as f64 * grid.texel).max(self.tall / 16.0);
         let size = [0, 1].map(|k| high[k] - low[k]);
         if size[0].max(size[1]) <= enough {
             for c in reached {
