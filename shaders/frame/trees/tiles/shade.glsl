@@ -95,7 +95,7 @@ Shown shade(uint rank, vec2 offset, out float depth) {
 #ifdef LAYERS
     return Shown(vec4(parts.sun, 1.0), vec4(parts.sky, 1.0), vec4(0.0, 0.0, parts.lit, 1.0 - parts.lit));
 #else
-    if (VIEW_MODE != 0u) return Shown(vec4(tree_mode(draw, t.cascade, parts.lit), 1.0));
+    if (VIEW_MODE != 0u) return Shown(vec4(tree_mode(draw == 1u && ESTIMATES == 0u ? 2u : draw, t.cascade, parts.lit), 1.0));
     return Shown(vec4(parts.sun + parts.sky, 1.0));
 #endif
 }
