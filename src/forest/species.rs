@@ -2,7 +2,7 @@
 
 use crate::bake::{Baked, tables};
 use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
-use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
+use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Resource, Sampler, vk};
 use crate::land::density::{DensityMap, HEIGHT_SOFTNESS, SLOPE_SOFTNESS, density_map};
 use crate::physics::masks::combination_table;
 use crate::physics::raster::Raster;
@@ -114,6 +114,18 @@ impl SpeciesData {
             densities,
             map_count,
         })
+    }
+}
+
+impl SpeciesData {
+    /// What lighting z-field trees reads of all species, by the names that shaders have for it.
+    pub fn lit(&self) -> [(&'static str, Resource<'_>); 4] {
+        [
+            ("species", Resource::Buffer(&self.table)),
+            ("views", Resource::Texture(&self.views, Sampler::LinearBorder)),
+            ("transfer_1", Resource::Texture(&self.transfer[0], Sampler::Linear)),
+            ("transfer_2", Resource::Texture(&self.transfer[1], Sampler::Linear)),
+        ]
     }
 }
 

@@ -241,15 +241,11 @@ impl TreeTiles {
                 ("view", Resource::Buffer(view)),
                 ("trees", Resource::Texels(&cull.trees)),
                 ("ranked", Resource::Texels(&self.ranked)),
-                ("species", Resource::Buffer(&forest.species.table)),
                 ("bases", Resource::Texels(&forest.species.bases)),
                 ("seen", Resource::Texels(&self.seen)),
-                ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
-                ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
-                ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
                 ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
             ];
-            pass.bind(&self.shade, &with(&all, &shown));
+            pass.bind(&self.shade, &[&all[..], &forest.species.lit(), &shown].concat());
             pass.push(&self.parameters);
             pass.dispatch([across, down, 1]);
         });

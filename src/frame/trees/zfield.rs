@@ -87,14 +87,11 @@ impl Trees {
                 ("view", Resource::Buffer(view)),
                 ("trees", Resource::Buffer(&cull.trees)),
                 ("lists", Resource::Buffer(&cull.lists)),
-                ("species", Resource::Buffer(&forest.species.table)),
                 ("bases", Resource::Buffer(&forest.species.bases)),
                 ("masks", Resource::Buffer(&forest.species.masks)),
-                ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
-                ("transfer_1", Resource::Texture(&forest.species.transfer[0], Sampler::Linear)),
-                ("transfer_2", Resource::Texture(&forest.species.transfer[1], Sampler::Linear)),
                 ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
             ];
+            let bound = [&bound[..], &forest.species.lit()].concat();
             for (k, program) in self.programs.iter().enumerate() {
                 pass.bind(program, &bound);
                 let command = (k * size_of::<DrawCommand>()) as u64;
