@@ -7,6 +7,7 @@
 #include "frame/view_mode.glsl"
 #include "frame/ground_mode.glsl"
 #include "frame/shown.glsl"
+#include "frame/column_items.glsl"
 
 layout(local_size_x = 8) in;
 layout(binding = 1) uniform usamplerBuffer quads;   // of three texels
@@ -66,8 +67,7 @@ GroundPoint point_of(uint index, vec3 position, vec3 ray, float distance, Camera
     return g;
 }
 
-shared uint items[64];     // pixels of each column that see ground: its row | samples << 8
-shared uint counts[8];
+shared uint items[8u * TILE_SIDE]; // pixels of each column that see ground: its row | samples << 8 | open samples << 16
 
 Shown sky_at(ivec2 pixel) {
     if (SKY_IMAGE) return load_pixel(pixel);
@@ -88,7 +88,7 @@ void list_pixels(uvec2 corner, uint column, uvec2 size) {
         }
         samples &= open;
         if (inside && samples != 0u) {
-            items[column * 8u + count] = row | samples << 8u | open << 16u;
+            items[column * TILE_SIDE + count] = row | samples << 8u | open << 16u;
             count++;
         }
         if (inside && samples == 0u && open != 0u && (!SKY_IMAGE || open + 1u != 1u << SAMPLES)) {
@@ -127,30 +127,15 @@ Shown ground_at(ivec2 pixel, uint seen, vec2 size) {
 #endif
 }
 
-// Item i of the tile, counted column after column: its column | row << 3 | samples << 8 | open samples << 16.
-uint item(uint i) {
-    uint found = 0u, before = 0u;
-    for (uint c = 0u; c < 8u; c++) {
-        uint count = counts[c];
-        if (i >= before && i < before + count) {
-            uint word = items[c * 8u + i - before];
-            found = c | (word & 7u) << 3u | (word & 0xffffff00u);
-        }
-        before += count;
-    }
-    return found;
-}
-
 void main() {
     uvec2 size = picture_size(), corner = gl_WorkGroupID.xy * TILE_SIDE;
     uint column = gl_LocalInvocationIndex;
     list_pixels(corner, column, size);
     barrier();
-    uint total = 0u;
-    for (uint c = 0u; c < 8u; c++) total += counts[c];
+    uint total = item_count();
     for (uint i = column; i < total; i += 8u) {
-        uint found = item(i);
-        ivec2 pixel = ivec2(corner + uvec2(found & 7u, found >> 3u & 7u));
+        uint slot = item_slot(i, TILE_SIDE), found = items[slot];
+        ivec2 pixel = ivec2(corner + uvec2(slot / TILE_SIDE, found & 0xffu));
         uint seen = found >> 8u & 0xffu, sky = found >> 16u & ~seen;
         float part = 1.0 / float(SAMPLES);
         Shown ground = scaled(ground_at(pixel, seen, vec2(size)), part * float(bitCount(seen)));

@@ -8,6 +8,8 @@
 #include "physics/transfer.glsl"
 #include "physics/zfield.glsl"
 #include "frame/trees/zfield_space.glsl"
+#include "frame/camera.glsl"
+#include "frame/trees/tiles/box.glsl"
 
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(std430, binding = 1) readonly buffer Trees { Tree items[]; } trees;
@@ -41,33 +43,22 @@ void main() {
     View v = view.v;
     Tree t = trees.items[lists.items[gl_VertexIndex >> 2]];
     Species kind = species.items[t.species];
-    vec3 half_extent = kind.scale_to_metres * t.scale;
-    mat3 back = tree_rotation(t);
-    vec3 c = (back * -t.centre) / half_extent;
+    TreePlane plane = tree_plane(t, kind);
+    vec3 c = (tree_rotation(t) * -t.centre) / plane.half_extent;
 
     vec3 layers = unpack_layers(t.view_layers, kind.first_layer);
     vec3 light_layers = unpack_layers(t.light_layers, kind.first_layer);
     bool below = t.view_layers >> 31u != 0u;
 
-    // The quad lies on the plane through the centre across the view. From afar its extents are the tree's; near, points
-    // before the plane look larger by far / (far - depth), and depth is at most that of the cylinder.
-    float far = max(length(c), 1e-6);
-    vec3 w = c / far, right, up;
-    frame_across(w, right, up);
-    float support = length(w.xy) + abs(w.z);
-    vec4 extent = tree_bounds(bases.items[uint(layers.x)].bounds, bases.items[uint(layers.y)].bounds,
-                              bases.items[uint(layers.z)].bounds, w, below, VIEW_RINGS);
-    extent *= far / max(far - support, 0.1 * far);
-    // Half a texel of the mip in use, so that bilinear edges are not cut.
-    vec2 margin = exp2(t.mip) / VIEW_RESOLUTION * vec2(1.0, support);
+    vec4 extent = quad_extent(plane, t.mip, bases.items[uint(layers.x)].bounds, bases.items[uint(layers.y)].bounds,
+                              bases.items[uint(layers.z)].bounds, below, VIEW_RINGS, VIEW_RESOLUTION);
     uint corner = gl_VertexIndex & 3u;
-    vec3 p = right * ((corner & 1u) == 0u ? extent.x - margin.x : extent.y + margin.x) +
-             up * ((corner & 2u) == 0u ? extent.z - margin.y : extent.w + margin.y);
+    vec3 p = plane.right * ((corner & 1u) == 0u ? extent.x : extent.y) + plane.up * ((corner & 2u) == 0u ? extent.z : extent.w);
     vec3 position = world_from_tree(t, kind, p);
     gl_Position = v.clip_from_world * vec4(position, 1.0);
 
-    vec3 toward = back * v.sun_direction;
-    vec3 l = toward / half_extent;
+    vec3 toward = tree_rotation(t) * v.sun_direction;
+    vec3 l = toward / plane.half_extent;
     for (int i = 0; i < 3; i++) {
         ViewBasis b = bases.items[uint(layers[i])];
         view_p[i] = vec4(project(b, p), p.z);
@@ -90,7 +81,7 @@ void main() {
     sun_from = vec4(toward, transfer_strength(sqrt(phase_angle)));
     optics = vec4(t.mip, kind.extinction * phase_angle / t.scale, t.fade, c.z);
     sun = vec4(t.sun, t.hole);
-    sky = vec4(t.sky, half_extent.z);
+    sky = vec4(t.sky, plane.half_extent.z);
     uvec3 row = masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz;
     tree_bits = uvec4(row, t.cascade | (below ? 16u : 0u) | t.species << 8u);
     bark_ratio = vec4(kind.bark_ratio, kind.bare_below);

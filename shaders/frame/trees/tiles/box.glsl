@@ -1,4 +1,4 @@
-// The quad of one tree: the plane that it lies on, and where that is on the screen. Needs frame/camera.glsl and frame/trees/zfield_space.glsl.
+// The quad of one tree: the plane through its centre across the view that it lies on, and where that is on the screen. Needs frame/camera.glsl and frame/trees/zfield_space.glsl.
 
 struct TreePlane {
     vec3 half_extent;  // m
@@ -29,10 +29,10 @@ vec3 to_tree(TreePlane p, vec3 d) {
 // Extents of the quad. From afar they are the tree's; near, points before the plane look larger by far / (far - depth), and
 // depth is at most that of the cylinder. Half a texel of the mip in use on each side, so that bilinear edges are not cut.
 vec4 quad_extent(TreePlane p, float mip, vec4 a, vec4 b, vec4 c, bool below, int rings, float resolution) {
-    float reach = length(p.w.xy) + abs(p.w.z);
+    float support = length(p.w.xy) + abs(p.w.z);
     vec4 extent = tree_bounds(a, b, c, p.w, below, rings);
-    extent *= p.far / max(p.far - reach, 0.1 * p.far);
-    vec2 margin = exp2(mip) / resolution * vec2(1.0, reach);
+    extent *= p.far / max(p.far - support, 0.1 * p.far);
+    vec2 margin = exp2(mip) / resolution * vec2(1.0, support);
     return extent + vec4(-margin.x, margin.x, -margin.y, margin.y);
 }
 
@@ -56,4 +56,3 @@ uvec4 screen_box(Tree t, Species kind, TreePlane p, Camera camera, uvec2 size) {
     high = behind ? extent : clamp(ceil(high + 0.5 * extent + 1.0 / 64.0), vec2(0.0), extent);
     return uvec4(uvec2(low), uvec2(high));
 }
-

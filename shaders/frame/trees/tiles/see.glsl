@@ -3,7 +3,6 @@
 // First the tile's list becomes bits: for each pixel, which of 32 trees' boxes it is in. Then every invocation goes through its
 // pixels, and each pixel through its own trees, front to back, until the farthest thing that one of its samples sees is nearer than
 // the next tree can be. Long lists are gone through in parts; between parts the samples are in the buffer that holds the result.
-#include "physics/hash.glsl"
 #include "physics/masks.glsl"
 #include "frame/trees/tiles/fetch.glsl"
 #include "physics/zfield.glsl"

@@ -2,7 +2,6 @@
 //
 // Every invocation lists the trees of its column of pixels; then the tile's list is shaded by all invocations in turn, so that
 // none waits for pixels that see no tree; then each puts its pixels together.
-#include "physics/hash.glsl"
 #include "physics/light.glsl"
 #include "frame/trees/tiles/fetch.glsl"
 #include "physics/zfield.glsl"
@@ -15,6 +14,7 @@
 #include "frame/view_mode.glsl"
 #include "frame/trees/zfield_mode.glsl"
 #include "frame/shown.glsl"
+#include "frame/column_items.glsl"
 
 layout(local_size_x = 8) in;
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
@@ -63,7 +63,7 @@ Shown shade(uint rank, vec2 offset, out float depth) {
     Surface surface = zfield_search(views, at, to, layers, vec3(t.view_weights, 1.0 - t.view_weights.x - t.view_weights.y), t.mip,
                                     magnified ? 0u : before, magnified ? before : 0u, below);
     float s = clamp(surface.s, -1e3, 0.999);
-    vec3 found = mix(point, c, s), toward = to_tree(TreePlane(vec3(1.0), plane.turn, plane.w, plane.far, plane.right, plane.up, vec4(0.0)), v.sun_direction);
+    vec3 found = mix(point, c, s), toward = tree_rotation(t) * v.sun_direction;
     vec3 metre = toward / plane.half_extent;
     vec3 world = world_from_tree(t, kind, found);
     depth = min(v.clip_from_world[3].z / max(dot(camera.forward, world), 1e-6), 1.0);
@@ -108,7 +108,6 @@ uint species_of(uint rank) {
 
 shared uint ranks[8u * MOST_ITEMS];  // the trees of each column
 shared uint places[8u * MOST_ITEMS]; // samples that see them; row of the pixel << 8
-shared uint counts[8];
 
 // Lists the trees of this invocation's column.
 void list_items(uvec2 corner, uint column) {
@@ -136,17 +135,6 @@ void list_items(uvec2 corner, uint column) {
     counts[column] = count;
 }
 
-// Where item i of the tile is, counted column after column; its column is slot / MOST_ITEMS. Beyond the last: ~0.
-uint item_slot(uint i) {
-    uint slot = ~0u, before = 0u;
-    for (uint c = 0u; c < 8u; c++) {
-        uint count = counts[c];
-        if (i >= before && i < before + count) slot = c * MOST_ITEMS + i - before;
-        before += count;
-    }
-    return slot;
-}
-
 // The pixel of an item, from the image's centre.
 vec2 item_offset(uvec2 corner, uint slot) {
     return vec2(corner + uvec2(slot / MOST_ITEMS, places[slot] >> 8u)) + 0.5 - 0.5 * vec2(p.size);
@@ -162,10 +150,9 @@ void main() {
     uint column = gl_LocalInvocationIndex;
     list_items(corner, column);
     barrier();
-    uint total = 0u;
-    for (uint c = 0u; c < 8u; c++) total += counts[c];
+    uint total = item_count();
     for (uint i = column; i < total; i += 8u) {
-        uint slot = item_slot(i);
+        uint slot = item_slot(i, MOST_ITEMS);
         float depth;
         shown[slot] = shade(ranks[slot], item_offset(corner, slot), depth);
 #ifdef LAYERS
