@@ -34,6 +34,7 @@ fn empty() -> BenchResult {
         cold: Default::default(),
         memory: Default::default(),
         metrics: BTreeMap::new(),
+        throughput: None,
         frames: Vec::new(),
     }
 }

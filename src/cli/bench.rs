@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use canopy::bake::cache;
-use canopy::gpu::{Gpu, TimingOptions};
+use canopy::gpu::{Gpu, Stamps, TimingOptions};
 use canopy::measure::bench::{Request, Subject, plan, run as measure};
 use canopy::measure::compare::{Comparison, compare};
 use canopy::measure::path::CameraPath;
@@ -30,7 +30,9 @@ A path file in TOML has [[keyframe]] tables with time, position, target and vert
 
 Metrics, ms: frame.wall_ms (begin to done), frame.stream_ms (choosing and uploading), frame.record_ms, frame.wait_ms
 (submit to done), frame.gpu_ms (first to last timestamp), frame.cpu_ms (CPU time of all threads), pass.NAME.gpu_ms,
-pass.NAME.cpu_ms, stage.NAME.gpu_ms, host.pace_ms (CPU time of fixed work before a frame: how fast the machine was).
+pass.NAME.cpu_ms, stage.NAME.gpu_ms, throughput.interval_ms (from the end of a frame to that of the next with --in-flight
+frames at once; all other times are of frames drawn alone: their latency), host.pace_ms (CPU time of fixed work before a
+frame: how fast the machine was).
 Reading back and encoding are not in any of them. On software drivers each pass is submitted by itself, so that its
 CPU time is known, which is steadier than wall time (--together: as on hardware).";
 
@@ -59,6 +61,10 @@ pub struct Args {
     /// Count vertices, primitives, fragments and invocations of each pass
     #[arg(long)]
     pipeline_statistics: bool,
+    /// Then draw the path with so many frames in flight, for a quarter of the frames and time at most, and tell frames a second
+    /// (0: do not)
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=8))]
+    in_flight: u32,
     /// No timestamps: to see what they cost themselves
     #[arg(long)]
     no_stamps: bool,
@@ -148,11 +154,12 @@ fn bench(
         frames: args.frames,
         duration: args.duration,
         timing: TimingOptions {
-            stamps: !args.no_stamps,
+            stamps: if args.no_stamps { Stamps::None } else { Stamps::Scopes },
             apart: software && !args.together,
             statistics: args.pipeline_statistics,
         },
         pace: software,
+        in_flight: args.in_flight,
         validate: args.device.validate,
     };
     let views = request.path.views(request.step)?;
@@ -235,6 +242,10 @@ fn text(r: &BenchResult) -> String {
         table.row([name, ms(s.median), interval, p5, p95, p99, low, mad, n]);
     }
     text += &table.text();
+    if let Some(t) = &r.throughput {
+        let cpu = t.cpu_ms.map_or(String::new(), |ms| format!(", {ms:.3} ms of CPU time each"));
+        text += &format!("\n{} in flight: {:.2} frames a second{cpu}\n", t.in_flight, t.frames_per_s);
+    }
     let mut cold = Table::new(1, &["before the first sample", "s"]);
     let c = &r.cold;
     for (what, s) in [

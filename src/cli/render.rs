@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use canopy::bake::{Baked, cache, load_or_bake_scene};
 use canopy::camera::{Eye, auto_exposure};
 use canopy::frame::{FrameReport, Renderer};
-use canopy::gpu::{DeviceInfo, FrameCapture, Gpu, PassTime};
+use canopy::gpu::{DeviceInfo, FrameCapture, Gpu, PassTime, Stamps, TimingOptions};
 use canopy::measure::results::SceneIdentity;
 use canopy::measure::sweep::kept::{self, Choice, Subject};
 use canopy::plan::{Plan, Representation, ViewMode};
@@ -294,6 +294,9 @@ fn draw(
     let mut renderer = Renderer::new(gpu, scene.clone(), plan, &baked)?;
     let build_s = start.elapsed().as_secs_f64();
     let exposure = auto_exposure(&scene) * args.exposure.exp2();
+    // Passes wait for each other's stamps only where their times are told.
+    let stamps = if quiet && !args.print.json { Stamps::Ends } else { Stamps::Scopes };
+    gpu.set_timing(TimingOptions { stamps, ..TimingOptions::default() });
     let progress = Progress::new("drawing", args.frames.into(), quiet);
     let mut frames_s = Vec::new();
     let mut frame = None;

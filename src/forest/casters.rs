@@ -13,7 +13,7 @@ use crate::frame::pages::{Block, PageSet};
 use crate::gpu::interface::{
     CULL_GROUP, Caster, CasterParameters, CasterQuad, DrawCommand, Seed, SeedQuad, ShadowBlock, Species,
 };
-use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, shaders};
+use crate::gpu::{Buffer, Gpu, Later, Program, Recorder, Resource, shaders};
 use crate::land::quadtree::{Quadtree, grid_cells};
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -111,7 +111,7 @@ impl CasterData {
     /// [`Error::Usage`] when the camera leaves no region to any of them; [`Error::Device`].
     pub fn update(
         &mut self,
-        gpu: &Gpu,
+        recorder: &mut Recorder,
         seeds: &mut SeedData,
         tree: &Quadtree,
         cascades: &[Cascade],
@@ -153,9 +153,9 @@ impl CasterData {
         }
         filling.close(&mut work, &mut fresh);
         number(seeds.region_capacity, &mut work);
-        gpu.renew(&mut self.quads, "caster quads", &work.quads)?;
-        gpu.renew(&mut self.seed_quads, "caster seed quads", &fresh)?;
-        gpu.renew(&mut self.commands, "caster draws", &draw_commands(&work))?;
+        recorder.renew(&mut self.quads, "caster quads", &work.quads)?;
+        recorder.renew(&mut self.seed_quads, "caster seed quads", &fresh)?;
+        recorder.renew(&mut self.commands, "caster draws", &draw_commands(&work))?;
         self.work = work;
         Ok(())
     }
@@ -209,18 +209,12 @@ impl CasterData {
         });
     }
 
-    /// Reads how many trees were drawn into each of the blocks, in all batches.
+    /// Has the draw commands read back, with how many trees each draws: one a block, batch after batch.
     ///
     /// # Errors
-    /// [`Error::Device`] if the device fails.
-    pub fn counts(&self, gpu: &Gpu) -> Result<Vec<u32>> {
-        let work = &self.work;
-        let commands: Vec<DrawCommand> = gpu.read(&self.commands, 0, work.batches.len() * work.blocks)?;
-        let mut counts = vec![0; work.blocks];
-        for (k, command) in commands.iter().enumerate() {
-            counts[k % work.blocks] += command.index_count / 6;
-        }
-        Ok(counts)
+    /// Those of [`Recorder::read`].
+    pub fn read_commands(&self, recorder: &mut Recorder) -> Result<Later<DrawCommand>> {
+        recorder.read(&self.commands, 0, self.work.batches.len() * self.work.blocks)
     }
 }
 

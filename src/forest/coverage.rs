@@ -172,6 +172,11 @@ impl CoverageData {
         self.cache.evicted() as u32
     }
 
+    /// What was to be produced may not have been: no tile holds anything.
+    pub fn forget(&mut self) {
+        self.cache = SlotCache::new(self.cache.capacity());
+    }
+
     /// First layer of the tile of a quad, if this frame uses it.
     pub fn layer(&self, key: &QuadKey) -> Option<u32> {
         self.cache.find(key).map(|slot| slot * self.groups)
@@ -183,7 +188,7 @@ impl CoverageData {
     /// [`crate::Error::Device`] when out of memory.
     pub fn update(
         &mut self,
-        gpu: &Gpu,
+        recorder: &mut Recorder,
         tree: &Quadtree,
         seeds: &SeedData,
         draws: &mut TerrainDraws,
@@ -230,9 +235,9 @@ impl CoverageData {
             work.batches.push(batch);
         }
         work.tiles = jobs.len() as u32;
-        gpu.renew(&mut self.jobs, "coverage jobs", &jobs)?;
-        gpu.renew(&mut self.quads, "coverage quads", &quads)?;
-        gpu.renew(&mut self.splats, "coverage splats", &splats)?;
+        recorder.renew(&mut self.jobs, "coverage jobs", &jobs)?;
+        recorder.renew(&mut self.quads, "coverage quads", &quads)?;
+        recorder.renew(&mut self.splats, "coverage splats", &splats)?;
         Ok(work)
     }
 

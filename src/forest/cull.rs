@@ -12,7 +12,7 @@ use crate::gpu::interface::{
     CAMERA_DRAWS, CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, FADE_FIRST, FADE_RATE, FADE_SPREAD,
     Seed, SeedQuad, Species, TREE_LISTS, Tree, View,
 };
-use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders, vk};
+use crate::gpu::{Buffer, Gpu, Later, Program, Recorder, Resource, Sampler, shaders, vk};
 use crate::land::silhouette::clearance;
 use crate::physics::handover;
 use crate::physics::hash::{HASH_FADE, hash, unit};
@@ -102,6 +102,11 @@ impl CullData {
         })
     }
 
+    /// Takes the distances of another plan.
+    pub fn set_limits(&mut self, plan: &Plan) {
+        (self.draw_limits, self.last) = (plan.draw_limits, plan.last_range());
+    }
+
     /// Records the cull of `seeds.visible` quads.
     pub fn record(
         &self,
@@ -154,19 +159,26 @@ impl CullData {
         }
     }
 
-    /// Reads how many trees the last frame drew.
+    /// Has the number of trees in view read back.
+    ///
+    /// # Errors
+    /// Those of [`Recorder::read`].
+    pub fn read_total(&self, recorder: &mut Recorder) -> Result<Later<u32>> {
+        recorder.read(&self.totals, 0, 1)
+    }
+
+    /// That a frame drew all of so many trees in view.
     ///
     /// # Errors
     /// [`Error::Usage`] when there were more than the plan holds.
-    pub fn count(&self, gpu: &Gpu) -> Result<u32> {
-        let total = gpu.read::<u32>(&self.totals, 0, 1)?[0];
+    pub fn check(&self, total: u32) -> Result<()> {
         if total > self.capacity {
             return Err(Error::Usage(format!(
                 "{total} trees in view, and the plan holds {}: raise zfield_max_trees or zfield_min_pixels",
                 self.capacity
             )));
         }
-        Ok(total)
+        Ok(())
     }
 }
 

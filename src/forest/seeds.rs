@@ -128,7 +128,7 @@ impl SeedData {
     /// [`Error::Usage`] when the view needs more quads than the plan holds.
     pub fn update(
         &mut self,
-        gpu: &Gpu,
+        recorder: &mut Recorder,
         scene: &Scene,
         plan: &Plan,
         tree: &Quadtree,
@@ -164,8 +164,8 @@ impl SeedData {
         self.visible = visible.len() as u32;
         self.keys = visible;
         let work = SeedWork { fresh: (self.visible, fresh.len() as u32) };
-        gpu.upload(&self.quads, 0, &self.visible_quads)?;
-        gpu.upload(&self.quads, u64::from(self.visible) * size_of::<SeedQuad>() as u64, &fresh)?;
+        recorder.upload(&self.quads, 0, &self.visible_quads)?;
+        recorder.upload(&self.quads, u64::from(self.visible) * size_of::<SeedQuad>() as u64, &fresh)?;
         Ok(work)
     }
 

@@ -92,12 +92,7 @@ impl SpeciesData {
         }
         let masks = combination_table(plan.samples);
         Ok(SpeciesData {
-            table: {
-                // A uniform block has its whole size.
-                let mut block = rows.clone();
-                block.resize(MAX_SPECIES as usize, bytemuck::Zeroable::zeroed());
-                gpu.buffer_with("species", &block)?
-            },
+            table: gpu.buffer_with("species", &block(&rows))?,
             rows,
             count: scene.species.len() as u32,
             views: texels,
@@ -118,6 +113,17 @@ impl SpeciesData {
 }
 
 impl SpeciesData {
+    /// Takes the ranges of another plan.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device fails.
+    pub fn set_ranges(&mut self, gpu: &Gpu, plan: &Plan) -> Result<()> {
+        for (row, range) in self.rows.iter_mut().zip(&plan.species_range) {
+            row.range = *range as f32;
+        }
+        gpu.upload(&self.table, 0, &block(&self.rows))
+    }
+
     /// What lighting z-field trees reads of all species, by the names that shaders have for it.
     pub fn lit(&self) -> [(&'static str, Resource<'_>); 4] {
         [
@@ -127,6 +133,13 @@ impl SpeciesData {
             ("transfer_2", Resource::Texture(&self.transfer[1], Sampler::Linear)),
         ]
     }
+}
+
+/// The rows as a uniform block, which has its whole size.
+fn block(rows: &[Row]) -> Vec<Row> {
+    let mut block = rows.to_vec();
+    block.resize(MAX_SPECIES as usize, bytemuck::Zeroable::zeroed());
+    block
 }
 
 /// Uploads a band of the light transfer of all species.

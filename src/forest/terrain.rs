@@ -130,6 +130,11 @@ impl TerrainData {
         if self.program.is_some() { self.cache.evicted() as u32 } else { 0 }
     }
 
+    /// What was to be produced may not have been: no tile holds anything.
+    pub fn forget(&mut self) {
+        self.cache = SlotCache::new(self.cache.capacity());
+    }
+
     /// Push constants of draws and dispatches, from a first quad on.
     pub fn parameters(&self, first_quad: u32) -> TerrainParameters {
         TerrainParameters {
@@ -207,8 +212,8 @@ impl TerrainData {
     ///
     /// # Errors
     /// [`Error::Device`] if the device fails.
-    pub fn upload(&self, gpu: &Gpu, draws: &TerrainDraws) -> Result<()> {
-        gpu.upload(&self.quads, 0, &draws.quads)
+    pub fn upload(&self, recorder: &mut Recorder, draws: &TerrainDraws) -> Result<()> {
+        recorder.upload(&self.quads, 0, &draws.quads)
     }
 
     /// Records the production of fresh tiles.

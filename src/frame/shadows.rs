@@ -144,7 +144,7 @@ impl Shadows {
     /// [`crate::Error::Device`] if the device fails.
     pub fn update(
         &mut self,
-        gpu: &Gpu,
+        recorder: &mut Recorder,
         (scene, plan): (&Scene, &Plan),
         tree: &Quadtree,
         eye: &Eye,
@@ -168,12 +168,12 @@ impl Shadows {
             return Ok(());
         }
         let on_gpu: Vec<ShadowBlock> = work.blocks.iter().map(|b| b.gpu).collect();
-        gpu.renew(&mut self.blocks, "shadow blocks", &on_gpu)?;
-        gpu.renew(&mut self.sums, "shadow page sums", &sums)?;
+        recorder.renew(&mut self.blocks, "shadow blocks", &on_gpu)?;
+        recorder.renew(&mut self.sums, "shadow page sums", &sums)?;
         if self.programs.ground.is_some() {
             let pixels = f64::from(scene.settings.terrain_pixels);
             let (all, ranges) = squares(tree, cascades, &work.blocks, pixels);
-            gpu.renew(&mut self.squares, "casting ground", &all)?;
+            recorder.renew(&mut self.squares, "casting ground", &all)?;
             work.ground = ranges;
         }
         self.work = work;

@@ -71,6 +71,8 @@ pub(super) struct Shared {
     pub push: khr::push_descriptor::Device,
     pub names: Option<ext::debug_utils::Device>,
     pub queue: vk::Queue,
+    /// The queue's family.
+    pub family: u32,
     pub pool: vk::CommandPool,
     pub timeline: vk::Semaphore,
     /// Number of the last submission.
@@ -378,6 +380,7 @@ fn open(
             push: khr::push_descriptor::Device::new(&instance, &device),
             names: debug_utils.then(|| ext::debug_utils::Device::new(&instance, &device)),
             queue: device.get_device_queue(family, 0),
+            family,
             device: device.clone(),
             pool: vk::CommandPool::null(),
             timeline: vk::Semaphore::null(),
@@ -472,7 +475,6 @@ impl Drop for Shared {
             let _ = self.wait_idle();
             self.collect(u64::MAX);
             drop(lock(&self.allocator).take());
-            self.timing.destroy(&self.device);
             for s in &self.samplers {
                 self.device.destroy_sampler(*s, None);
             }

@@ -59,6 +59,8 @@ pub(super) enum Retired {
     Image(vk::Image, Vec<vk::ImageView>, Allocation),
     Program(vk::Pipeline, vk::PipelineLayout, vk::DescriptorSetLayout),
     Pool(vk::DescriptorPool),
+    Commands(vk::CommandPool),
+    Queries(vk::QueryPool),
 }
 
 impl Retired {
@@ -81,6 +83,14 @@ impl Retired {
                 }
                 Retired::Pool(pool) => {
                     shared.device.destroy_descriptor_pool(pool, None);
+                    return;
+                }
+                Retired::Commands(pool) => {
+                    shared.device.destroy_command_pool(pool, None);
+                    return;
+                }
+                Retired::Queries(pool) => {
+                    shared.device.destroy_query_pool(pool, None);
                     return;
                 }
                 Retired::Program(p, l, s) => {

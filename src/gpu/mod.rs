@@ -2,7 +2,8 @@
 //!
 //! Rules that the rest of the module keeps, and that its `unsafe` blocks rely on:
 //!
-//! * **One queue, one thread at a time.** Commands are recorded through [`Recorder`], which borrows the [`Gpu`].
+//! * **One queue, one thread at a time.** Commands are recorded through [`Recorder`], which borrows the [`Gpu`]. Submissions run
+//!   one after the other, ordered by the barriers at the ends of passes; what the host writes for one lies in its [`Ring`] slot.
 //! * **Images live in `GENERAL` layout** from creation to destruction; a full memory barrier stands at the start
 //!   and end of every pass, so no pass depends on what another did but in order.
 //! * **Handles outlive their use.** A dropped resource is retired with the number of the next submission and
@@ -15,6 +16,7 @@ pub mod interface;
 mod memory;
 mod program;
 mod record;
+mod ring;
 mod select;
 mod sets;
 mod timing;
@@ -30,8 +32,9 @@ pub use program::{DepthTest, GraphicsDesc, Program, Sampler};
 #[doc(hidden)]
 pub use record::Fault;
 pub use record::{Attachment, ComputePass, Recorder, RenderPass, Resource, Targets, Work};
+pub use ring::{Done, InFlight, Later, Ring};
 pub use select::{DeviceInfo, devices, find};
-pub use timing::{PassTime, PipelineStatistics, Timing, TimingOptions};
+pub use timing::{PassTime, PipelineStatistics, Stamps, Timing, TimingOptions};
 
 /// A descriptor binding of a shader, from reflection; every binding is in set 0.
 #[derive(Clone, Copy, Debug)]

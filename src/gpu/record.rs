@@ -8,8 +8,9 @@ use bytemuck::Pod;
 use super::context::{Gpu, device_error};
 use super::memory::{Buffer, Image};
 use super::program::{Program, Sampler};
+use super::ring::{InFlight, Later, Ring, Slot, Wanted};
 use super::sets;
-use super::timing::{MAX_SCOPES, Queries, Scope, Timing, TimingOptions};
+use super::timing::{MAX_SCOPES, Queries, Scope, Stamps, Timing, TimingOptions};
 use crate::clock::{monotonic_ns, process_cpu_ms_since, process_cpu_ns};
 use crate::{Error, Result};
 
@@ -63,8 +64,15 @@ pub enum Fault {
 /// Records commands for one submission.
 pub struct Recorder<'g> {
     gpu: &'g Gpu,
+    ring: Ring,
+    /// What it records into; `None` once it is launched.
+    slot: Option<Slot>,
+    /// The slot's command buffer; null where it cannot be recorded to.
     cmd: vk::CommandBuffer,
     queries: Queries,
+    wanted: Wanted,
+    /// Uploads are recorded that no barrier has followed.
+    uploaded: bool,
     options: TimingOptions,
     scopes: Vec<Scope>,
     draws: u32,
@@ -90,17 +98,37 @@ pub(super) fn barrier(device: &ash::Device, cmd: vk::CommandBuffer) {
 }
 
 impl Gpu {
-    /// Starts recording.
+    /// Starts a recording that is alone.
     ///
     /// # Errors
     /// [`Error::Device`] when out of memory.
     pub fn record(&self) -> Result<Recorder<'_>> {
+        self.record_in(&Ring::default())
+    }
+
+    /// Starts recording in a slot of a ring.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when out of memory.
+    pub fn record_in(&self, ring: &Ring) -> Result<Recorder<'_>> {
         let options = self.timing();
-        let queries = self.take_queries(options.statistics)?;
+        let mut slot = ring.take(self)?;
+        let prepared = slot.prepare(self, options.statistics);
+        let queries = match prepared {
+            Ok(queries) => queries,
+            Err(e) => {
+                ring.put(slot);
+                return Err(e);
+            }
+        };
         let mut recorder = Recorder {
             gpu: self,
+            ring: ring.clone(),
+            slot: Some(slot),
             cmd: vk::CommandBuffer::null(),
             queries,
+            wanted: Wanted::default(),
+            uploaded: false,
             options,
             scopes: Vec::new(),
             draws: 0,
@@ -111,6 +139,8 @@ impl Gpu {
         };
         recorder.begin()?;
         let (device, cmd) = (&self.shared.device, recorder.cmd);
+        // What came before on the queue is done, and seen, before anything here.
+        barrier(device, cmd);
         // SAFETY: the command buffer is being recorded; no other recording uses the pools.
         unsafe {
             device.cmd_reset_query_pool(cmd, queries.stamps, 0, 2 * MAX_SCOPES + 2);
@@ -118,12 +148,19 @@ impl Gpu {
                 device.cmd_reset_query_pool(cmd, pool, 0, MAX_SCOPES);
             }
         }
-        recorder.stamp(0);
+        if options.stamps != Stamps::None {
+            recorder.stamp(0);
+        }
         Ok(recorder)
     }
 
-    /// Submits one command buffer and waits for it; then frees what was retired before.
+    /// Submits one command buffer and waits for it.
     pub(super) fn submit(&self, cmd: vk::CommandBuffer) -> Result<()> {
+        self.wait(self.send(cmd)?)
+    }
+
+    /// Submits one command buffer, and returns its number.
+    pub(super) fn send(&self, cmd: vk::CommandBuffer) -> Result<u64> {
         let s = &self.shared;
         let value = s.submitted.fetch_add(1, Ordering::AcqRel) + 1;
         // Not vkQueueSubmit2: after it, GPU-assisted validation (1.3.239) never sees the timeline semaphore signalled.
@@ -133,18 +170,22 @@ impl Gpu {
             .command_buffers(&commands)
             .signal_semaphores(&semaphores)
             .push_next(&mut signal)];
+        let works = s.failures.memory().and_then(|()| s.failures.device());
+        // SAFETY: the command buffer is complete, and its resources are alive until it is waited for: they are retired, not
+        // destroyed, and its slot is not used before.
+        let sent = works.and_then(|()| unsafe { s.device.queue_submit(s.queue, &submit, vk::Fence::null()) });
+        sent.map(|()| value).map_err(device_error("submit"))
+    }
+
+    /// Waits for a submission; then frees what was retired before it.
+    pub(super) fn wait(&self, number: u64) -> Result<()> {
+        let s = &self.shared;
+        let (semaphores, values) = ([s.timeline], [number]);
         let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
-        // SAFETY: the command buffer is complete and its resources are alive until the wait returns.
-        unsafe {
-            let works = s.failures.memory().and_then(|()| s.failures.device());
-            works
-                .and_then(|()| s.device.queue_submit(s.queue, &submit, vk::Fence::null()))
-                .map_err(device_error("submit"))?;
-            // A device that only plays lost is waited for all the same: it has the commands.
-            let done = s.device.wait_semaphores(&wait, u64::MAX);
-            s.failures.device().and(done).map_err(device_error("waiting for the device"))?;
-        }
-        s.collect(value);
+        // SAFETY: the device is alive. One that only plays lost is waited for all the same: it has the commands.
+        let done = unsafe { s.device.wait_semaphores(&wait, u64::MAX) };
+        s.failures.device().and(done).map_err(device_error("waiting for the device"))?;
+        s.collect(number);
         Ok(())
     }
 }
@@ -154,47 +195,85 @@ impl<'g> Recorder<'g> {
         &self.gpu.shared.device
     }
 
-    /// Begins a command buffer.
+    /// Begins the slot's command buffer.
     fn begin(&mut self) -> Result<()> {
-        let s = &self.gpu.shared;
-        let allocate = vk::CommandBufferAllocateInfo::default()
-            .command_pool(s.pool)
-            .level(vk::CommandBufferLevel::PRIMARY)
-            .command_buffer_count(1);
-        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the pool is used by this thread only while the recorder borrows the Gpu; `Drop` frees the buffer.
-        unsafe {
-            let free = s.failures.memory();
-            let cmd = free.and_then(|()| s.device.allocate_command_buffers(&allocate));
-            self.cmd = cmd.map_err(device_error("command buffer"))?[0];
-            let free = s.failures.memory();
-            free.and_then(|()| s.device.begin_command_buffer(self.cmd, &begin))
-                .map_err(device_error("recording"))
+        if let Some(slot) = &self.slot {
+            slot.begin()?;
+            self.cmd = slot.commands;
         }
+        Ok(())
+    }
+
+    /// Ends the command buffer and submits it; returns the number of the submission.
+    fn send(&mut self) -> Result<u64> {
+        let s = &self.gpu.shared;
+        self.submitted.get_or_insert_with(monotonic_ns);
+        let cmd = std::mem::take(&mut self.cmd);
+        let ended = s.failures.memory().and_then(|()| {
+            // SAFETY: every pass is closed.
+            unsafe { s.device.end_command_buffer(cmd) }
+        });
+        ended.map_err(device_error("recording"))?;
+        self.gpu.send(cmd)
     }
 
     /// Submits what is recorded so far, waits for it, and returns the CPU time that all threads took meanwhile, ms.
     fn flush(&mut self) -> Result<Option<f64>> {
-        let s = &self.gpu.shared;
-        let start = monotonic_ns();
-        self.submitted.get_or_insert(start);
-        let cpu = process_cpu_ns();
-        let ended = s.failures.memory().and_then(|()| {
-            // SAFETY: every pass is closed; the buffer is freed after the wait, or by `Drop`.
-            unsafe { s.device.end_command_buffer(self.cmd) }
-        });
-        ended.map_err(device_error("recording"))?;
-        self.gpu.submit(self.cmd)?;
+        let (start, cpu) = (monotonic_ns(), process_cpu_ns());
+        let number = self.send()?;
+        self.gpu.wait(number)?;
         let cpu = process_cpu_ms_since(cpu);
         self.waited += monotonic_ns() - start;
-        // SAFETY: the submission is done.
-        unsafe { s.device.free_command_buffers(s.pool, &[std::mem::take(&mut self.cmd)]) };
         Ok(cpu)
+    }
+
+    /// Writes `content` into `buffer` from byte `offset` on, before whatever is recorded from now on. Between two passes no
+    /// byte may be written twice.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if it does not fit; [`Error::Device`] when out of memory.
+    pub fn upload<T: Pod>(&mut self, buffer: &Buffer, offset: u64, content: &[T]) -> Result<()> {
+        let bytes: &[u8] = bytemuck::cast_slice(content);
+        let size = bytes.len() as u64;
+        if offset + size > buffer.bytes() {
+            return Err(Error::Usage(format!("upload of {size} bytes at {offset} is too long")));
+        }
+        let (device, cmd) = (self.device(), self.cmd);
+        let Some(slot) = self.slot.as_mut().filter(|_| size > 0 && cmd != vk::CommandBuffer::null()) else {
+            return Ok(());
+        };
+        let (from, at) = slot.uploads.take(self.gpu, size)?;
+        from.mapped()?[at as usize..][..bytes.len()].copy_from_slice(bytes);
+        let region = [vk::BufferCopy { src_offset: at, dst_offset: offset, size }];
+        // SAFETY: the command buffer is being recorded, both buffers are alive, and the region is in range of both.
+        unsafe { device.cmd_copy_buffer(cmd, from.handle, buffer.handle, &region) };
+        self.uploaded = true;
+        Ok(())
+    }
+
+    /// The same into a buffer that is made anew when it is too short.
+    ///
+    /// # Errors
+    /// As [`Gpu::buffer`] and [`Recorder::upload`].
+    pub fn renew<T: Pod>(&mut self, buffer: &mut Buffer, name: &str, content: &[T]) -> Result<()> {
+        let bytes = size_of_val(content) as u64;
+        if bytes > buffer.bytes() {
+            *buffer = self.gpu.buffer(name, bytes.next_power_of_two())?;
+        }
+        self.upload(buffer, 0, content)
+    }
+
+    /// Reads `count` values of a buffer from byte `offset` on as they are at the end of the recording.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if the range is outside the buffer.
+    pub fn read<T: Pod>(&mut self, buffer: &Buffer, offset: u64, count: usize) -> Result<Later<T>> {
+        self.wanted.add(buffer, offset, count)
     }
 
     /// Writes a timestamp. A barrier follows because lavapipe may otherwise run the stamp after the work that it precedes.
     fn stamp(&self, query: u32) {
-        if !self.options.stamps || self.cmd == vk::CommandBuffer::null() {
+        if self.cmd == vk::CommandBuffer::null() {
             return;
         }
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
@@ -220,12 +299,20 @@ impl<'g> Recorder<'g> {
             // SAFETY: the command buffer is being recorded.
             unsafe { names.cmd_begin_debug_utils_label(self.cmd, &label) };
         }
-        self.stamp(2 * index as u32 + 2);
+        if std::mem::take(&mut self.uploaded) {
+            barrier(self.device(), self.cmd);
+        }
+        let stamped = self.options.stamps == Stamps::Scopes;
+        if stamped {
+            self.stamp(2 * index as u32 + 2);
+        }
         work(self);
         if pass {
             barrier(self.device(), self.cmd);
         }
-        self.stamp(2 * index as u32 + 3);
+        if stamped {
+            self.stamp(2 * index as u32 + 3);
+        }
         if let Some(names) = names {
             // SAFETY: the label was begun above.
             unsafe { names.cmd_end_debug_utils_label(self.cmd) };
@@ -377,31 +464,61 @@ impl<'g> Recorder<'g> {
     ///
     /// # Errors
     /// What went wrong while recording, or [`Error::Device`].
-    pub fn submit(mut self) -> Result<Timing> {
+    pub fn submit(self) -> Result<Timing> {
+        self.launch()?.wait().map(|done| done.timing)
+    }
+
+    /// Submits, and does not wait.
+    ///
+    /// # Errors
+    /// What went wrong while recording, or [`Error::Device`].
+    pub fn launch(mut self) -> Result<InFlight> {
         if let Some(e) = self.error.take() {
             return Err(e);
         }
-        self.stamp(1);
-        let clock = self.options.stamps.then(|| self.gpu.calibrate()).flatten();
-        self.flush()?;
-        let done_ns = monotonic_ns();
-        let scopes = std::mem::take(&mut self.scopes);
-        let timing = self.gpu.read_timing(self.queries, self.options, scopes, clock);
-        let (draws, dispatches) = (self.draws, self.dispatches);
-        let submit_ns = self.submitted.unwrap_or(done_ns);
-        let wait_ms = self.waited as f64 * 1e-6;
-        Ok(Timing { wait_ms, submit_ns, done_ns, draws, dispatches, ..timing })
+        if let Some(slot) = &mut self.slot {
+            if std::mem::take(&mut self.uploaded) {
+                barrier(&self.gpu.shared.device, slot.commands);
+            }
+            self.wanted.record(self.gpu, slot)?;
+        }
+        // What is copied is the host's to read.
+        barrier(self.device(), self.cmd);
+        let stamped = self.options.stamps != Stamps::None;
+        if stamped {
+            self.stamp(1);
+        }
+        let clock = stamped.then(|| self.gpu.calibrate()).flatten();
+        let sent_ns = monotonic_ns();
+        let number = self.send()?;
+        let timing = Timing {
+            wait_ms: self.waited as f64 * 1e-6,
+            submit_ns: self.submitted.unwrap_or(sent_ns),
+            draws: self.draws,
+            dispatches: self.dispatches,
+            ..Timing::default()
+        };
+        Ok(InFlight {
+            gpu: self.gpu.clone(),
+            ring: self.ring.clone(),
+            slot: self.slot.take(),
+            number,
+            options: self.options,
+            scopes: std::mem::take(&mut self.scopes),
+            clock,
+            wanted: std::mem::take(&mut self.wanted),
+            timing,
+            sent_ns,
+        })
     }
 }
 
 impl Drop for Recorder<'_> {
     fn drop(&mut self) {
-        let s = &self.gpu.shared;
-        if self.cmd != vk::CommandBuffer::null() {
-            // SAFETY: the command buffer is either never submitted or already waited for.
-            unsafe { s.device.free_command_buffers(s.pool, &[self.cmd]) };
+        // Nothing of it was submitted that was not waited for.
+        if let Some(slot) = self.slot.take() {
+            self.ring.put(slot);
         }
-        self.gpu.return_queries(self.queries);
     }
 }
 

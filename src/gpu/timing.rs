@@ -17,21 +17,27 @@ use crate::Result;
 /// Most scopes in one recording.
 pub(super) const MAX_SCOPES: u32 = 256;
 
+/// Where timestamps stand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub enum Stamps {
+    /// Nowhere.
+    None,
+    /// At the beginning and the end of a recording: passes run as they would without.
+    #[default]
+    Ends,
+    /// Around every scope too, each with a barrier: no pass begins before the stamp of the one before is written.
+    Scopes,
+}
+
 /// What recordings measure.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct TimingOptions {
-    /// Two timestamps a scope, each with a barrier.
-    pub stamps: bool,
+    /// Where timestamps stand.
+    pub stamps: Stamps,
     /// Every pass is a submission of its own, with its CPU time.
     pub apart: bool,
     /// Pipeline statistics a pass, on devices that have them ([`super::DeviceInfo::pipeline_statistics`]).
     pub statistics: bool,
-}
-
-impl Default for TimingOptions {
-    fn default() -> Self {
-        TimingOptions { stamps: true, apart: false, statistics: false }
-    }
 }
 
 /// What the pipeline did in a pass.
@@ -82,7 +88,7 @@ pub struct PassTime {
 /// What a recording measured.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Timing {
-    /// Passes in order. Without stamps their times are zero.
+    /// Passes in order. Without stamps around scopes their times are zero.
     pub passes: Vec<PassTime>,
     /// Stages, each of several passes, in order.
     pub stages: Vec<PassTime>,
@@ -111,7 +117,7 @@ pub(super) struct Scope {
     pub cpu_ms: Option<f64>,
 }
 
-/// Query pools of a recording, used again by later ones.
+/// Query pools of a recording.
 #[derive(Clone, Copy)]
 pub(super) struct Queries {
     pub stamps: vk::QueryPool,
@@ -131,22 +137,6 @@ pub(super) struct TimingState {
     pub calibration: Option<Calibration>,
     /// Bits of a timestamp that mean something.
     pub valid_bits: u32,
-    pub free: Mutex<Vec<Queries>>,
-}
-
-impl TimingState {
-    /// Destroys what is kept; every recording must be over.
-    pub fn destroy(&self, device: &ash::Device) {
-        for q in lock(&self.free).drain(..) {
-            // SAFETY: the device is idle and no recorder holds these pools.
-            unsafe {
-                device.destroy_query_pool(q.stamps, None);
-                if let Some(s) = q.statistics {
-                    device.destroy_query_pool(s, None);
-                }
-            }
-        }
-    }
 }
 
 /// The extension that calibrates timestamps against the monotonic clock, if the device has one.
@@ -200,13 +190,9 @@ impl Gpu {
         found.ok().map(|(t, _)| (t[0], t[1]))
     }
 
-    /// Query pools that no recording uses.
-    pub(super) fn take_queries(&self, statistics: bool) -> Result<Queries> {
+    /// Query pools for one recording at a time.
+    pub(super) fn make_queries(&self, statistics: bool) -> Result<Queries> {
         let s = &self.shared;
-        let mut free = lock(&s.timing.free);
-        if let Some(k) = free.iter().position(|q| q.statistics.is_some() == statistics) {
-            return Ok(free.swap_remove(k));
-        }
         let pool = |kind, count| vk::QueryPoolCreateInfo::default().query_type(kind).query_count(count);
         let stamps = pool(vk::QueryType::TIMESTAMP, 2 * MAX_SCOPES + 2);
         let counts = pool(vk::QueryType::PIPELINE_STATISTICS, MAX_SCOPES).pipeline_statistics(counters());
@@ -225,11 +211,6 @@ impl Gpu {
         }
     }
 
-    /// Gives query pools back.
-    pub(super) fn return_queries(&self, queries: Queries) {
-        lock(&self.shared.timing.free).push(queries);
-    }
-
     /// Reads what a recording of these scopes measured; its submissions must be done. Query 0 and 1 are the recording's own.
     pub(super) fn read_timing(
         &self,
@@ -242,7 +223,7 @@ impl Gpu {
         let mut timing = Timing::default();
         let mut stamps = vec![[0u64; 2]; 2 * scopes.len() + 2];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
-        if options.stamps {
+        if options.stamps != Stamps::None {
             // SAFETY: the submissions that wrote the queries are complete. NOT_READY leaves availability at zero.
             let _ = unsafe { s.device.get_query_pool_results(queries.stamps, 0, &mut stamps, flags) };
         }
@@ -263,7 +244,7 @@ impl Gpu {
         for ((k, scope), count) in scopes.into_iter().enumerate().zip(counts) {
             let own = &stamps[2 * k + 2..2 * k + 4];
             let times = interval(stamps[0], own[0], bits).zip(interval(own[0], own[1], bits));
-            let Some((start, length)) = times.or((!options.stamps).then_some((0, 0))) else {
+            let Some((start, length)) = times.or((options.stamps != Stamps::Scopes).then_some((0, 0))) else {
                 timing.lost += 1;
                 continue;
             };

@@ -1,4 +1,4 @@
-//! Uploads and read-backs: staged, waited for, in chunks that bound host memory.
+//! Uploads and read-backs outside frames: staged, and waited for. Those of a frame are recorded in it.
 
 use ash::vk;
 use bytemuck::Pod;
@@ -37,18 +37,6 @@ impl Gpu {
             // SAFETY: both buffers are alive and the region is in range of both.
             unsafe { device.cmd_copy_buffer(cmd, staging.handle, buffer.handle, &region) };
         })
-    }
-
-    /// Writes `content` into `buffer`, which is made anew when that is too short, and waits.
-    ///
-    /// # Errors
-    /// As [`Gpu::buffer`] and [`Gpu::upload`].
-    pub fn renew<T: Pod>(&self, buffer: &mut Buffer, name: &str, content: &[T]) -> Result<()> {
-        let bytes = size_of_val(content) as u64;
-        if bytes > buffer.bytes() {
-            *buffer = self.buffer(name, bytes.next_power_of_two())?;
-        }
-        self.upload(buffer, 0, content)
     }
 
     /// Writes one mip level of all layers (or of `layers` from `first` on; of a volume, all slices of its only layer), rows

@@ -1,7 +1,7 @@
 //! Frame timings along a camera path. Several subjects (settings) are drawn in turn, so that what changes on the machine
 //! changes for all of them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -10,14 +10,14 @@ use super::host::Host;
 use super::pace::pace_ms;
 use super::path::CameraPath;
 use super::results::{
-    BENCH_SCHEMA_VERSION, BenchResult, Cold, Frame, Memory, PathIdentity, SceneIdentity, Scope,
+    BENCH_SCHEMA_VERSION, BenchResult, Cold, Frame, Memory, PathIdentity, SceneIdentity, Scope, Throughput,
 };
 use crate::Result;
 use crate::bake::{Baked, load_or_bake_scene};
 use crate::camera::{Eye, auto_exposure};
-use crate::clock::monotonic_ns;
-use crate::frame::{FrameReport, Renderer};
-use crate::gpu::{Gpu, PassTime, TimingOptions};
+use crate::clock::{monotonic_ns, process_cpu_ms_since, process_cpu_ns};
+use crate::frame::{FrameReport, Renderer, Ticket};
+use crate::gpu::{Gpu, PassTime, Stamps, TimingOptions};
 use crate::plan::{Drawing, Plan, Rasterizer};
 use crate::progress::Progress;
 use crate::scene::{Camera, Scene};
@@ -37,6 +37,8 @@ pub struct Request {
     pub timing: TimingOptions,
     /// The fixed work before every frame too.
     pub pace: bool,
+    /// Frames in flight at once for [`Throughput`]; 0: it is not measured.
+    pub in_flight: u32,
     /// The device is watched by the validation layers; for the report only.
     pub validate: bool,
 }
@@ -144,9 +146,61 @@ pub fn run(gpu: &Gpu, subjects: &mut [Subject], request: &Request, quiet: bool) 
         }
     }
     progress.finish();
+    let mut flows = Vec::new();
+    for subject in subjects.iter_mut() {
+        flows.push(throughput(gpu, &mut subject.renderer, &views, request)?);
+    }
     let host = Host::here(&gpu.info().name, request.validate);
-    let finished = subjects.iter().zip(frames).map(|(s, f)| result(gpu, s, f, request, views.len(), &host));
+    let finished = subjects.iter().zip(frames).zip(flows).map(|((subject, frames), throughput)| {
+        let found = BenchResult { throughput, ..result(gpu, subject, frames, request, views.len(), &host) };
+        found.summarised()
+    });
     Ok(finished.collect())
+}
+
+/// Draws the path with several frames in flight, for a quarter of the frames and time of the samples at most: how many frames a
+/// second there are when none waits for the one before. Passes are not timed, and so do not wait for each other's stamps.
+fn throughput(
+    gpu: &Gpu,
+    renderer: &mut Renderer,
+    views: &[Camera],
+    request: &Request,
+) -> Result<Option<Throughput>> {
+    let in_flight = request.in_flight as usize;
+    if in_flight == 0 {
+        return Ok(None);
+    }
+    gpu.set_timing(TimingOptions { stamps: Stamps::None, ..TimingOptions::default() });
+    let exposure = auto_exposure(renderer.scene());
+    let eyes: Vec<Eye> =
+        views.iter().map(|v| Eye::new(v, &renderer.scene().terrain, renderer.plan().size)).collect();
+    let (frames, start) = ((request.frames as usize / 4).max(8), Instant::now());
+    let limit = Duration::try_from_secs_f64(0.25 * request.duration).unwrap_or(Duration::MAX);
+    let (mut waiting, mut ends, mut began) = (VecDeque::new(), Vec::new(), process_cpu_ns());
+    for eye in eyes.iter().cycle().take(in_flight + frames) {
+        if waiting.len() == in_flight {
+            ends.extend(waiting.pop_front().map(|t| finish(renderer, t)).transpose()?);
+            if ends.len() == 1 {
+                began = process_cpu_ns();
+            }
+            if ends.len() > 2 && start.elapsed() >= limit {
+                break;
+            }
+        }
+        let cascades = renderer.cascades(eye);
+        waiting.push_back(renderer.submit(eye, &cascades, exposure)?);
+    }
+    for ticket in waiting {
+        ends.push(finish(renderer, ticket)?);
+    }
+    gpu.set_timing(request.timing);
+    let cpu_ms = process_cpu_ms_since(began);
+    Ok(Some(Throughput::new(request.in_flight, &ends, cpu_ms)))
+}
+
+/// Waits for a frame; when it was done, ns.
+fn finish(renderer: &mut Renderer, ticket: Ticket) -> Result<u64> {
+    Ok(renderer.finish(ticket)?.0.timing.done_ns)
 }
 
 /// What is kept of a frame's report.
@@ -196,7 +250,7 @@ fn result(
     host: &Host,
 ) -> BenchResult {
     let (scene, plan) = (subject.renderer.scene(), subject.renderer.plan());
-    let mut result = BenchResult {
+    BenchResult {
         schema_version: BENCH_SCHEMA_VERSION,
         command: "bench".into(),
         scene: SceneIdentity::new(scene),
@@ -222,8 +276,7 @@ fn result(
             }),
         },
         metrics: BTreeMap::new(),
+        throughput: None,
         frames,
-    };
-    result.summarise();
-    result
+    }
 }

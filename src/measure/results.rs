@@ -7,7 +7,7 @@ use super::host::Host;
 use super::path::Keyframe;
 use super::statistics::Summary;
 use crate::frame::Tiles;
-use crate::gpu::{DeviceInfo, PipelineStatistics, TimingOptions};
+use crate::gpu::{DeviceInfo, PipelineStatistics, Stamps, TimingOptions};
 use crate::scene::Scene;
 use crate::settings::{KNOBS, Settings};
 use crate::{Error, Result};
@@ -45,8 +45,40 @@ pub struct BenchResult {
     pub memory: Memory,
     /// Summary of every metric, by name.
     pub metrics: BTreeMap<String, Summary>,
-    /// Every frame in order.
+    /// What several frames in flight get done; absent where it was not measured, and from results that are older.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub throughput: Option<Throughput>,
+    /// Every frame in order, drawn alone.
     pub frames: Vec<Frame>,
+}
+
+/// What several frames in flight get done: the path again, each frame submitted before the ones before it are done.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Throughput {
+    /// Frames in flight at once.
+    pub in_flight: u32,
+    /// Frames a second.
+    pub frames_per_s: f64,
+    /// CPU time of all threads of the process, ms a frame.
+    pub cpu_ms: Option<f64>,
+    /// From the end of a frame to the end of the next, ms.
+    pub interval_ms: Vec<f64>,
+}
+
+impl Throughput {
+    /// Of frames that ended then, ns, and took so much CPU time from the first end to the last.
+    pub fn new(in_flight: u32, ends_ns: &[u64], cpu_ms: Option<f64>) -> Self {
+        let between = |pair: &[u64]| pair[1].saturating_sub(pair[0]) as f64 * 1e-6;
+        let interval_ms: Vec<f64> = ends_ns.windows(2).map(between).collect();
+        let frames = interval_ms.len().max(1) as f64;
+        let total = interval_ms.iter().sum::<f64>().max(1e-6);
+        Throughput {
+            in_flight,
+            frames_per_s: 1e3 * frames / total,
+            cpu_ms: cpu_ms.map(|ms| ms / frames),
+            interval_ms,
+        }
+    }
 }
 
 /// Which scene.
@@ -99,7 +131,7 @@ pub struct PathIdentity {
 /// How passes were timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct TimingIdentity {
-    /// With timestamps.
+    /// With timestamps around every pass.
     pub stamps: bool,
     /// Each pass a submission of its own.
     pub apart: bool,
@@ -109,7 +141,11 @@ pub struct TimingIdentity {
 
 impl From<TimingOptions> for TimingIdentity {
     fn from(o: TimingOptions) -> Self {
-        TimingIdentity { stamps: o.stamps, apart: o.apart, pipeline_statistics: o.statistics }
+        TimingIdentity {
+            stamps: o.stamps == Stamps::Scopes,
+            apart: o.apart,
+            pipeline_statistics: o.statistics,
+        }
     }
 }
 
@@ -277,7 +313,7 @@ impl BenchResult {
         names
     }
 
-    /// Names of all metrics in the order of a table: frame, stages, passes, host.
+    /// Names of all metrics in the order of a table: frame, stages, passes, throughput, host.
     pub fn metric_names(&self) -> Vec<String> {
         let mut names: Vec<String> = ["wall_ms", "cpu_ms", "gpu_ms", "stream_ms", "record_ms", "wait_ms"]
             .map(|m| format!("frame.{m}"))
@@ -287,6 +323,7 @@ impl BenchResult {
         for pass in self.pass_names() {
             names.extend(["cpu_ms", "gpu_ms"].map(|m| format!("pass.{pass}.{m}")));
         }
+        names.push("throughput.interval_ms".into());
         names.push("host.pace_ms".into());
         names.retain(|n| self.metrics.contains_key(n));
         names
@@ -315,16 +352,21 @@ impl BenchResult {
                 }
             }
         }
+        for interval in self.throughput.iter().flat_map(|t| &t.interval_ms) {
+            put("throughput.interval_ms".into(), Some(*interval));
+        }
         all
     }
 
-    /// Summarises the samples.
-    pub fn summarise(&mut self) {
+    /// With its samples summarised.
+    pub fn summarised(mut self) -> Self {
         let samples = self.samples();
         self.metrics = samples.into_iter().filter_map(|(name, s)| Some((name, Summary::new(&s)?))).collect();
+        self
     }
 
-    /// Rows of a table with [`CSV_COLUMNS`]: one a frame, stage and pass, of this setting ("A", or "B" with `--against`).
+    /// Rows of a table with [`CSV_COLUMNS`]: one a frame, stage and pass, of this setting ("A", or "B" with `--against`); then
+    /// one an interval between ends of frames in flight, as wall time.
     pub fn csv_rows(&self, setting: &str) -> String {
         let mut text = String::new();
         let number = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:.6}"));
@@ -358,6 +400,12 @@ impl BenchResult {
                         ",".repeat(11)
                     );
                 }
+            }
+        }
+        if let Some(t) = &self.throughput {
+            for (k, interval) in t.interval_ms.iter().enumerate() {
+                let name = format!("in flight {}", t.in_flight);
+                text += &format!("{setting},{k},,,throughput,{name},,,,{interval:.6}{}\n", ",".repeat(10));
             }
         }
         text

@@ -1,9 +1,11 @@
 //! What tests on a device share: the device, probes of shader functions, and small scenes.
 
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use canopy::bake::{Baked, load_or_bake_scene};
+use canopy::camera::Eye;
 use canopy::frame::Renderer;
 use canopy::gpu::interface::Seed;
 use canopy::gpu::{Gpu, GpuOptions, Resource, Shader, Validation};
@@ -117,14 +119,30 @@ pub const WOODS: &str = "[terrain]\nheightmap = \"builtin:ridge\"\n[[species]]\n
 /// Draws frames from cameras that jump at random, and passes the number of each on to `after`. What lives on the device
 /// must stay what it was after the first: a frame leaves at most its last read-back behind for the next to free, and
 /// lists of quads grow by a per cent.
-pub fn soak(gpu: &Gpu, scene: &Scene, frames: u32, mut after: impl FnMut(u32)) {
-    let mut renderer = renderer(gpu, scene, &jump(scene, 0), [96, 64], false);
+pub fn soak(gpu: &Gpu, scene: &Scene, frames: u32, after: impl FnMut(u32)) {
+    soak_in_flight(gpu, scene, (frames, 1), after);
+}
+
+/// The same with so many frames in flight.
+pub fn soak_in_flight(
+    gpu: &Gpu,
+    scene: &Scene,
+    (frames, in_flight): (u32, usize),
+    mut after: impl FnMut(u32),
+) {
+    let size = [96, 64];
+    let mut renderer = renderer(gpu, scene, &jump(scene, 0), size, false);
     let bytes = |report: &[(String, u64)]| report.iter().map(|(_, bytes)| bytes).sum::<u64>();
-    let mut first = Vec::new();
+    let (mut first, mut waiting) = (Vec::new(), VecDeque::new());
     for frame in 0..frames {
-        renderer.render(&jump(scene, frame), 1.0).unwrap();
+        let eye = Eye::new(&jump(scene, frame), &scene.terrain, size);
+        let cascades = renderer.cascades(&eye);
+        waiting.push_back(renderer.submit(&eye, &cascades, 1.0).unwrap());
+        if waiting.len() == in_flight {
+            renderer.finish(waiting.pop_front().unwrap()).unwrap();
+        }
         let now = gpu.memory_report();
-        if frame == 0 {
+        if frame as usize + 1 <= in_flight {
             first = now;
         } else {
             assert!(now.len() <= first.len() + 2, "frame {frame}: {now:?} where there was {first:?}");

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use canopy::clock::{process_cpu_ms_since, process_cpu_ns};
 use canopy::frame::Renderer;
-use canopy::gpu::{Gpu, GpuOptions, TimingOptions};
+use canopy::gpu::{Gpu, GpuOptions, Stamps, TimingOptions};
 use canopy::measure::bench::{Request, Subject, plan, run};
 use canopy::measure::compare::{FRAME, Verdict, compare};
 use canopy::measure::path::CameraPath;
@@ -33,7 +33,7 @@ fn open() -> Gpu {
 
 /// Each view once with and once without, in turn, which first alternating: CPU time of the process, logarithms.
 fn overhead(gpu: &Gpu, subject: &mut Subject, path: &CameraPath, with: TimingOptions) -> (f64, [f64; 2]) {
-    let off = TimingOptions { stamps: false, apart: false, statistics: false };
+    let off = TimingOptions { stamps: Stamps::None, apart: false, statistics: false };
     let views = path.views(0.5).unwrap();
     let mut pairs = Vec::new();
     for k in 0..12 * views.len() {
@@ -63,7 +63,7 @@ fn stamps_cost_at_most_two_per_cent() {
     for view in path.views(0.5).unwrap() {
         subject.renderer.render(&view, 1.0).unwrap();
     }
-    let stamps = TimingOptions { stamps: true, apart: false, statistics: false };
+    let stamps = TimingOptions { stamps: Stamps::Scopes, apart: false, statistics: false };
     for (name, options, bound) in [
         ("stamps", stamps, 0.02),
         // Not a stamp: what a submission for each pass costs, in the shortest frames that anyone benches.
@@ -89,9 +89,17 @@ fn stamps_cost_at_most_two_per_cent() {
 fn passes_are_all_of_the_frame_within_three_per_cent() {
     let gpu = open();
     let (subject, path) = subject(&gpu);
-    let timing = TimingOptions { stamps: true, apart: false, statistics: false };
-    let request =
-        Request { path, step: 0.5, frames: 128, duration: 120.0, timing, pace: false, validate: false };
+    let timing = TimingOptions { stamps: Stamps::Scopes, apart: false, statistics: false };
+    let request = Request {
+        path,
+        step: 0.5,
+        frames: 128,
+        duration: 120.0,
+        timing,
+        pace: false,
+        in_flight: 0,
+        validate: false,
+    };
     let mut subjects = [subject];
     let result = run(&gpu, &mut subjects, &request, true).unwrap().swap_remove(0);
     let parts: Vec<f64> = result
@@ -117,9 +125,17 @@ fn passes_are_all_of_the_frame_within_three_per_cent() {
 fn a_build_is_itself_and_five_per_cent_are_found() {
     let gpu = open();
     let (subject, path) = subject(&gpu);
-    let timing = TimingOptions { stamps: true, apart: true, statistics: false };
-    let request =
-        Request { path, step: 0.5, frames: 256, duration: 120.0, timing, pace: true, validate: false };
+    let timing = TimingOptions { stamps: Stamps::Scopes, apart: true, statistics: false };
+    let request = Request {
+        path,
+        step: 0.5,
+        frames: 256,
+        duration: 120.0,
+        timing,
+        pace: true,
+        in_flight: 0,
+        validate: false,
+    };
     let mut subjects = [subject];
     let runs: Vec<BenchResult> =
         (0..21).map(|_| run(&gpu, &mut subjects, &request, true).unwrap().swap_remove(0)).collect();

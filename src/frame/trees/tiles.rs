@@ -14,7 +14,7 @@ use crate::forest::cull::CullData;
 use crate::frame::Forest;
 use crate::frame::targets::ImageTargets;
 use crate::gpu::interface::{BIN_LANES, DEPTH_BINS, ORDER_LANES, TILE_SIDE, TileParameters, TileState};
-use crate::gpu::{Buffer, Gpu, Image, Program, Recorder, Resource, Sampler, Shader, shaders, vk};
+use crate::gpu::{Buffer, Gpu, Image, Later, Program, Recorder, Resource, Sampler, Shader, shaders, vk};
 use crate::plan::{Plan, TileBuffer, TileBuffers};
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -251,13 +251,20 @@ impl TreeTiles {
         });
     }
 
-    /// Checks what the last frame's tiles found.
+    /// Has what the tiles find read back.
+    ///
+    /// # Errors
+    /// Those of [`Recorder::read`].
+    pub fn read_state(&self, recorder: &mut Recorder) -> Result<Later<TileState>> {
+        recorder.read(&self.state, 0, 1)
+    }
+
+    /// Checks what a frame's tiles found.
     ///
     /// # Errors
     /// [`Error::Usage`] when a tile had more to look at than drivers let a shader do.
-    pub fn check(&self, gpu: &Gpu) -> Result<()> {
-        let state: Vec<TileState> = gpu.read(&self.state, 0, 1)?;
-        if state[0].overrun != 0 {
+    pub fn check(state: &TileState) -> Result<()> {
+        if state.overrun != 0 {
             return Err(Error::Usage(
                 "more trees stand one behind the other than tiles can go through: use --rasterizer graphics"
                     .into(),

@@ -9,7 +9,7 @@ use super::design::{HOME, Setting, Swept, most_accurate, one_at_a_time, product}
 use super::judge;
 use super::result::{CameraError, Identity, Point, SWEEP_SCHEMA_VERSION, Sample, SweepResult, Time};
 use crate::camera::{Eye, auto_exposure};
-use crate::gpu::{Gpu, TimingOptions};
+use crate::gpu::{Gpu, Stamps, TimingOptions};
 use crate::image::Layers;
 use crate::measure::bench::{self, Subject};
 use crate::measure::host::Host;
@@ -222,8 +222,9 @@ impl Runner<'_> {
             step: 1.0,
             frames: self.request.rounds * views.len() as u32,
             duration: f64::INFINITY,
-            timing: TimingOptions { stamps: true, apart: false, statistics: false },
+            timing: TimingOptions { stamps: Stamps::Ends, apart: false, statistics: false },
             pace: false,
+            in_flight: 0,
             validate: self.request.validate,
             path,
         };

@@ -1,0 +1,140 @@
+//! What of a renderer is the image's: its targets, and the passes that draw to them. An image of another size gets another.
+
+use super::ground::Ground;
+use super::report::ReadBacks;
+use super::seen_ground::SeenGround;
+use super::stream::{Moment, Streamed};
+use super::targets::ImageTargets;
+use super::tonemap::Tonemap;
+use super::trees::tiles::TreeTiles;
+use super::trees::zfield::Trees;
+use super::world::World;
+use crate::Result;
+use crate::gpu::{Gpu, Recorder};
+use crate::plan::{Plan, Rasterizer};
+use crate::scene::Scene;
+
+/// What an image of one size takes.
+pub struct Canvas {
+    /// What is drawn to.
+    pub targets: ImageTargets,
+    passes: Passes,
+    tonemap: Tonemap,
+}
+
+/// What draws ground and trees; without trees drawn one by one, the ground alone.
+enum Passes {
+    /// The graphics pipeline: what it finds it lights.
+    Graphics(Box<Ground>, Option<Trees>),
+    /// Compute tiles: what is seen is found first, and lit once.
+    Tiles(Box<SeenGround>, Option<Box<TreeTiles>>),
+}
+
+impl Canvas {
+    /// Builds what the plan lists for the image.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, (scene, plan): (&Scene, &Plan), world: &World) -> Result<Self> {
+        let rows = world.near().map(|(forest, _)| forest.species.mask_rows);
+        Ok(Canvas {
+            targets: ImageTargets::new(gpu, plan)?,
+            passes: match plan.rasterizer {
+                Rasterizer::Graphics => {
+                    let trees = rows.map(|rows| Trees::new(gpu, scene, plan, rows)).transpose()?;
+                    Passes::Graphics(Box::new(Ground::new(gpu, plan)?), trees)
+                }
+                Rasterizer::Tiles => {
+                    let trees = rows.map(|rows| TreeTiles::new(gpu, scene, plan, rows)).transpose()?;
+                    Passes::Tiles(Box::new(SeenGround::new(gpu, scene, plan)?), trees.map(Box::new))
+                }
+            },
+            tonemap: Tonemap::new(gpu, plan)?,
+        })
+    }
+
+    /// Records all that shows in the image.
+    pub fn draw(
+        &self,
+        recorder: &mut Recorder,
+        plan: &Plan,
+        world: &World,
+        streamed: &Streamed,
+        moment: Moment,
+    ) {
+        recorder.stage("image", |r| {
+            let ground = (&world.terrain, &streamed.draws);
+            if let Some(sky) = &world.sky {
+                sky.record(r, &world.view, &self.targets);
+            }
+            if let Some((forest, map)) = world.forest.as_ref().zip(world.shader_map.as_ref()) {
+                map.record(r, &world.view, ground, forest);
+            }
+            match &self.passes {
+                Passes::Graphics(pass, trees) => {
+                    self.graphics(r, world, streamed, moment, (pass, trees.as_ref()));
+                }
+                Passes::Tiles(pass, trees) => {
+                    let shown = trees.as_deref().filter(|_| plan.shows_trees());
+                    self.tiles(r, world, streamed, (pass, shown));
+                }
+            }
+        });
+    }
+
+    /// Ground and trees in the graphics pipeline.
+    fn graphics(
+        &self,
+        r: &mut Recorder,
+        world: &World,
+        streamed: &Streamed,
+        moment: Moment,
+        (pass, trees): (&Ground, Option<&Trees>),
+    ) {
+        let (view, indices, map) = (&world.view, &world.terrain_indices, &world.shadows.map);
+        let ground = (&world.terrain, &streamed.draws);
+        let forest = world.forest.as_ref().zip(world.shader_map.as_ref());
+        let light = moment.light;
+        let clear = world.sky.is_none().then(|| light.sky.map(|c| (c * light.scale) as f32));
+        pass.record(r, view, indices, ground, forest, map, &self.targets, clear);
+        if let (Some(trees), Some((forest, cull))) = (trees, world.near()) {
+            trees.record(r, view, forest, cull, map, &self.targets);
+        }
+    }
+
+    /// Ground and trees in tiles: what each sample sees, then the light on that.
+    fn tiles(
+        &self,
+        r: &mut Recorder,
+        world: &World,
+        streamed: &Streamed,
+        (pass, trees): (&SeenGround, Option<&TreeTiles>),
+    ) {
+        let (view, indices, map) = (&world.view, &world.terrain_indices, &world.shadows.map);
+        let ground = (&world.terrain, &streamed.draws);
+        let forest = world.forest.as_ref().zip(world.shader_map.as_ref());
+        let trees = trees.zip(world.near());
+        pass.see(r, view, indices, ground, &self.targets);
+        if let Some((tiles, (forest, cull))) = trees {
+            tiles.see(r, view, forest, cull, &self.targets);
+        }
+        let seen = trees.map(|(tiles, _)| &tiles.seen);
+        pass.light(r, view, ground, forest, map, seen, &self.targets);
+        if let Some((tiles, (forest, cull))) = trees {
+            tiles.shade(r, view, forest, cull, map, &self.targets);
+        }
+    }
+
+    /// Records the display picture.
+    pub fn resolve(&self, recorder: &mut Recorder, plan: &Plan, moment: Moment) {
+        self.tonemap.record(recorder, &self.targets, plan, moment.exposure / moment.light.scale);
+    }
+
+    /// Has what the tiles find read back.
+    pub(super) fn read(&self, recorder: &mut Recorder, plan: &Plan, reads: &mut ReadBacks) -> Result<()> {
+        if let Passes::Tiles(_, Some(tiles)) = &self.passes {
+            reads.tiles = plan.shows_trees().then(|| tiles.read_state(recorder)).transpose()?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,229 @@
+//! What of a renderer is the world's and not the image's: caches, species, tables, shadow maps. It goes on when the image gets
+//! another size.
+
+use super::ground;
+use super::report::ReadBacks;
+use super::shadows::{CastingTrees, Shadows};
+use super::sky::SkyPass;
+use super::trees::shader_map::ShaderMap;
+use crate::bake::Baked;
+use crate::forest::casters::CasterData;
+use crate::forest::coverage::CoverageData;
+use crate::forest::cull::CullData;
+use crate::forest::seeds::SeedData;
+use crate::forest::species::SpeciesData;
+use crate::forest::tables::TableData;
+use crate::forest::terrain::TerrainData;
+use crate::gpu::interface::View;
+use crate::gpu::{Buffer, Gpu, Recorder};
+use crate::plan::Plan;
+use crate::scene::Scene;
+use crate::{Error, Result};
+
+/// What lives between frames for the trees; absent from scenes without.
+pub struct Forest {
+    /// Seeds.
+    pub seeds: SeedData,
+    /// Coverage tiles.
+    pub coverage: CoverageData,
+    /// Species.
+    pub species: SpeciesData,
+    /// Forest tables of the species.
+    pub tables: TableData,
+    /// What finds the trees that are drawn one by one, if any can come within range.
+    pub near: Option<NearTrees>,
+}
+
+/// Trees drawn one by one.
+pub struct NearTrees {
+    /// Culling.
+    pub cull: CullData,
+    /// What finds the trees that cast shadows, where there is a sun.
+    pub casters: Option<CasterData>,
+}
+
+/// What lives between frames whatever their size.
+pub struct World {
+    /// What shaders know of the moment.
+    pub view: Buffer,
+    /// The ground.
+    pub terrain: TerrainData,
+    /// Indices of a quad of it.
+    pub terrain_indices: Buffer,
+    /// The trees.
+    pub forest: Option<Forest>,
+    /// Trees far away.
+    pub shader_map: Option<ShaderMap>,
+    /// Shadow maps.
+    pub shadows: Shadows,
+    /// The sky, where it is an image.
+    pub sky: Option<SkyPass>,
+}
+
+impl Forest {
+    fn new(
+        gpu: &Gpu,
+        (scene, plan): (&Scene, &Plan),
+        baked: &[Baked],
+        terrain: &TerrainData,
+    ) -> Result<Self> {
+        let species = SpeciesData::new(gpu, scene, plan, baked)?;
+        let tables: Vec<_> = baked.iter().map(|b| b.tables.as_ref()).collect();
+        let tables = TableData::new(gpu, &tables, plan.pair_tables)?;
+        let near = || -> Result<NearTrees> {
+            Ok(NearTrees {
+                cull: CullData::new(gpu, scene, plan, &tables)?,
+                casters: (plan.cascades > 0).then(|| CasterData::new(gpu, scene, plan)).transpose()?,
+            })
+        };
+        let near = plan.z_fields.then(near).transpose()?;
+        Ok(Forest {
+            coverage: CoverageData::new(gpu, scene, plan, &species, &terrain.tree)?,
+            seeds: SeedData::new(gpu, scene, plan)?,
+            near,
+            species,
+            tables,
+        })
+    }
+
+    /// What draws the trees that cast.
+    fn casting(&self) -> Option<CastingTrees<'_>> {
+        let data = self.near.as_ref()?.casters.as_ref()?;
+        Some(CastingTrees { data, seeds: &self.seeds, species: &self.species })
+    }
+}
+
+impl World {
+    /// Builds what the plan lists.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, (scene, plan): (&Scene, &Plan), baked: &[Baked]) -> Result<Self> {
+        let terrain = TerrainData::new(gpu, scene, plan)?;
+        let forest =
+            (plan.range > 0.0).then(|| Forest::new(gpu, (scene, plan), baked, &terrain)).transpose()?;
+        Ok(World {
+            view: gpu.buffer("view", size_of::<View>() as u64)?,
+            terrain_indices: ground::mesh_indices(gpu)?,
+            shader_map: forest.as_ref().map(|f| ShaderMap::new(gpu, plan, f)).transpose()?,
+            shadows: Shadows::new(gpu, scene, plan)?,
+            sky: SkyPass::new(gpu, scene, plan)?,
+            forest,
+            terrain,
+        })
+    }
+
+    /// Takes another plan that this world serves.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the device fails.
+    pub fn adapt(&mut self, gpu: &Gpu, plan: &Plan) -> Result<()> {
+        let Some(forest) = &mut self.forest else { return Ok(()) };
+        forest.species.set_ranges(gpu, plan)?;
+        if let Some(near) = &mut forest.near {
+            near.cull.set_limits(plan);
+        }
+        Ok(())
+    }
+
+    /// What was to be drawn may not have been: nothing kept is relied on.
+    pub fn forget(&mut self) {
+        self.terrain.forget();
+        self.shadows.forget();
+        if let Some(forest) = &mut self.forest {
+            forest.seeds.forget();
+            forest.coverage.forget();
+        }
+    }
+
+    /// Records which trees the camera sees.
+    pub fn visibility(&self, recorder: &mut Recorder) {
+        if let Some(Forest { seeds, species, tables, near: Some(NearTrees { cull, .. }), .. }) = &self.forest
+        {
+            recorder.stage("visibility", |r| {
+                cull.record(r, &self.view, seeds, species, tables, &self.terrain);
+            });
+        }
+    }
+
+    /// Records what the sun sees that it did not see before.
+    pub fn shadows(&self, recorder: &mut Recorder) {
+        let casting = self.forest.as_ref().and_then(Forest::casting);
+        self.shadows.record(recorder, &self.view, &self.terrain, casting);
+    }
+
+    /// Has the numbers of trees read back.
+    pub(super) fn read(&self, recorder: &mut Recorder, cascades: usize, reads: &mut ReadBacks) -> Result<()> {
+        let Some(Forest { seeds, near: Some(near), .. }) = &self.forest else { return Ok(()) };
+        reads.cascades = cascades;
+        if seeds.visible > 0 {
+            reads.trees = Some(near.cull.read_total(recorder)?);
+        }
+        if let Some(casters) = &near.casters {
+            let cascades = self.shadows.work.blocks.iter().map(|b| b.cascade).collect();
+            reads.casters = Some((casters.read_commands(recorder)?, cascades));
+        }
+        Ok(())
+    }
+
+    /// The trees that are drawn one by one, with all that they need.
+    pub fn near(&self) -> Option<(&Forest, &CullData)> {
+        self.forest.as_ref().and_then(|f| Some((f, &f.near.as_ref()?.cull)))
+    }
+
+    /// What finds the trees that cast shadows.
+    pub fn casters(&self) -> Option<&CasterData> {
+        self.forest.as_ref()?.near.as_ref()?.casters.as_ref()
+    }
+}
+
+/// The plan of a world that serves what another plan wants: the size and the distances are those wanted, the capacities those held.
+///
+/// # Errors
+/// [`Error::Usage`] with what differs, or does not suffice.
+pub(super) fn served(held: &Plan, wanted: &Plan) -> Result<Plan> {
+    let same = |a: &Plan, b: &Plan| -> [(&str, bool); 8] {
+        let grid = |p: &Plan| [p.quad_side, p.tile_side, p.pattern_density, p.plain_side].map(f64::to_bits);
+        [
+            ("representation", a.representation == b.representation),
+            ("rasterizer", a.rasterizer == b.rasterizer),
+            ("view mode", a.view_mode == b.view_mode),
+            ("samples and layers", (a.samples, a.layers) == (b.samples, b.layers)),
+            ("trees one by one", (a.z_fields, a.transfer_bands) == (b.z_fields, b.transfer_bands)),
+            ("tables", a.pair_tables == b.pair_tables),
+            ("sun", a.cascades == b.cascades),
+            ("seed quads", grid(a) == grid(b) && a.region_capacity == b.region_capacity),
+        ]
+    };
+    let room = |p: &Plan| {
+        [
+            ("seed quads", p.seed_regions),
+            ("seed quads on silhouettes", p.silhouette_quads),
+            ("seed quads of shadows", p.shadow_quads),
+            ("trees", p.tree_capacity),
+            ("casters", p.caster_capacity),
+            ("terrain tiles", p.terrain_tiles),
+            ("coverage tiles", p.cover_slots),
+        ]
+    };
+    let differs =
+        same(held, wanted).into_iter().find(|(_, same)| !same).map(|(what, _)| format!("other {what}"));
+    let short = room(held).into_iter().zip(room(wanted)).find(|((_, has), (_, wants))| has < wants);
+    let short = short.map(|((what, has), (_, wants))| format!("{wants} {what}, and there are {has}"));
+    if let Some(why) = differs.or(short) {
+        let [w, h] = wanted.size;
+        return Err(Error::Usage(format!(
+            "an image of {w} x {h} takes another world: {why}; make another renderer, or plan the world for the largest image"
+        )));
+    }
+    Ok(Plan {
+        items: wanted.items.clone(),
+        size: wanted.size,
+        shadow_distance: wanted.shadow_distance,
+        species_range: wanted.species_range.clone(),
+        range: wanted.range,
+        silhouette_ratio: wanted.silhouette_ratio,
+        draw_limits: wanted.draw_limits,
+        ..held.clone()
+    })
+}
