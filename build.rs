@@ -28,7 +28,7 @@ fn main() -> Fallible<()> {
     sources.sort();
 
     let compiler = shaderc::Compiler::new()?;
-    let mut rust = String::new();
+    let (mut rust, mut all) = (String::new(), String::new());
     let mut types = HashMap::new();
     for path in &sources {
         let name = path.strip_prefix(&root)?.to_string_lossy().replace('\\', "/");
@@ -41,10 +41,13 @@ fn main() -> Fallible<()> {
                 return Err(format!("{name}: {} is {}, and {kind} in {first}", c.name, c.kind).into());
             }
         }
-        let entry =
-            cached(&out, &name, &text, |key| shader(&compiler, &name, path, &constants, &root, &out, key))?;
+        let entry = cached(&out, &name, &text, |key| {
+            shader(&compiler, &name, path, (&constants, invocations(&text)), &root, &out, key)
+        })?;
         rust.push_str(&entry);
+        write!(all, "&{}, ", name.replace(['/', '.'], "_").to_uppercase())?;
     }
+    writeln!(rust, "/// All of them.\npub static ALL: &[&Shader] = &[{all}];")?;
     fs::write(out.join("shaders.rs"), rust)?;
 
     let interface = root.join("interface.glsl");
@@ -110,6 +113,15 @@ fn constants(text: &str) -> Fallible<Vec<Constant>> {
     Ok(found)
 }
 
+/// Invocations a workgroup of a shader with everything that it includes: the product of its local sizes.
+fn invocations(text: &str) -> u32 {
+    let sizes = text.match_indices("local_size_").map(|(at, _)| {
+        let number = text[at..].trim_start_matches(|c: char| !c.is_ascii_digit());
+        number.split(|c: char| !c.is_ascii_digit()).next().and_then(|n| n.parse::<u32>().ok()).unwrap_or(1)
+    });
+    sizes.product::<u32>().max(1)
+}
+
 /// `make(key)`, or what it returned for the same text before; the key names the text, and whatever `make` writes beside
 /// must carry it in its name: a shader changed and changed back would else meet the SPIR-V of the change.
 fn cached(
@@ -155,7 +167,7 @@ fn shader(
     compiler: &shaderc::Compiler,
     name: &str,
     path: &Path,
-    constants: &[Constant],
+    (constants, invocations): (&[Constant], u32),
     root: &Path,
     out: &Path,
     key: &str,
@@ -198,10 +210,15 @@ fn shader(
     bindings.sort();
     // Not the block's own size: that is rounded up.
     let push = module.enumerate_push_constant_blocks(None)?.first().map_or(0, end);
+    // Built-in variables have no location of their own.
+    let outputs = module.enumerate_output_variables(None)?.into_iter().filter(|v| v.location < 1 << 16);
+    let locations =
+        outputs.map(|v| v.location + v.array.dims.iter().product::<u32>().max(1)).max().unwrap_or(0);
     let mut rust = String::new();
     writeln!(rust, "/// `shaders/{name}`.")?;
     writeln!(rust, "pub static {}: Shader = Shader {{", stem.to_uppercase())?;
     writeln!(rust, "    name: {name:?}, stage: vk::ShaderStageFlags::{stage}, push_constant_bytes: {push},")?;
+    writeln!(rust, "    locations: {locations}, invocations: {invocations},")?;
     writeln!(rust, "    spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{key}.spv\")),")?;
     writeln!(rust, "    bindings: &[")?;
     for (binding, name, kind) in bindings {

@@ -1,7 +1,7 @@
 //! `canopy devices`.
 
 use canopy::Result;
-use canopy::gpu::DeviceInfo;
+use canopy::gpu::{DeviceInfo, tree_components};
 
 use super::SCHEMA_VERSION;
 use super::output::{self, Table};
@@ -32,6 +32,7 @@ pub fn run(args: &Args) -> Result<()> {
     if args.json {
         return output::json(&Report { schema_version: SCHEMA_VERSION, command: "devices", devices });
     }
+    let has = |fact: bool| if fact { "yes" } else { "no" }.to_string();
     let mut text = String::new();
     for d in &devices {
         let fits =
@@ -50,6 +51,10 @@ pub fn run(args: &Args) -> Result<()> {
             ("most layers", d.max_layers.to_string()),
             ("largest buffer", output::bytes(d.max_storage_bytes)),
             ("samples a pixel", counts.join(", ")),
+            ("trees by graphics", has(d.max_vertex_components >= tree_components())),
+            ("pushed descriptors", has(d.push_descriptors)),
+            ("layers by vertices", has(d.vertex_layers)),
+            ("pipeline statistics", has(d.pipeline_statistics)),
         ] {
             table.row([format!("  {what}"), value]);
         }

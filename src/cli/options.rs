@@ -85,7 +85,7 @@ impl DeviceOptions {
     /// failed.
     pub fn with<T>(&self, work: impl FnOnce(&Gpu) -> Result<T>) -> Result<T> {
         let validation = if self.validate { Validation::Full } else { Validation::Off };
-        let gpu = Gpu::new(&GpuOptions { device: self.device.clone(), validation })?;
+        let gpu = Gpu::new(&GpuOptions { device: self.device.clone(), validation, ..GpuOptions::default() })?;
         let done = work(&gpu);
         match (gpu.close(), done) {
             (Err(e @ Error::Validation(_)), _) | (_, Err(e)) | (Err(e), Ok(_)) => Err(e),

@@ -13,7 +13,7 @@ use crate::frame::pages::{Block, PageSet};
 use crate::gpu::interface::{
     CULL_GROUP, Caster, CasterParameters, CasterQuad, DrawCommand, Seed, SeedQuad, ShadowBlock, Species,
 };
-use crate::gpu::{Buffer, Gpu, Later, Program, Recorder, Resource, shaders};
+use crate::gpu::{Buffer, Gpu, Later, Layers, Program, Recorder, Resource, shaders};
 use crate::land::quadtree::{Quadtree, grid_cells};
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -30,6 +30,13 @@ pub struct DrawnBlock {
     pub pages: PageSet,
     /// The same for shaders.
     pub gpu: ShadowBlock,
+}
+
+impl DrawnBlock {
+    /// Whether it is drawn with these layers.
+    pub fn in_layers(&self, layers: Layers) -> bool {
+        !matches!(layers, Layers::One(layer) if layer as usize != self.cascade)
+    }
 }
 
 /// Buffers and program.

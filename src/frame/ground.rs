@@ -8,8 +8,8 @@ use crate::forest::coverage;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::gpu::interface::{ForestNode, TERRAIN_CELLS, TERRAIN_HEIGHTS};
 use crate::gpu::{
-    Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler, Targets,
-    shaders, vk,
+    Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Layers, Program, Recorder, Resource, Sampler,
+    Targets, shaders, vk,
 };
 use crate::plan::{Plan, ViewMode};
 
@@ -127,7 +127,7 @@ impl Ground {
             targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), last)).collect();
         let depth = Some(targets.depth.attachment(Some([0.0; 4]), last));
         let (tiles, nodes) = self.none.or(forest);
-        recorder.render("terrain", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
+        recorder.render("terrain", &Targets { colors: &colors, depth, layers: Layers::One(0) }, |pass| {
             let resources = [
                 ("view", Resource::Buffer(view)),
                 ("quads", Resource::Buffer(&terrain.quads)),

@@ -9,7 +9,8 @@ use crate::Result;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::gpu::interface::{TERRAIN_CELLS, TILE_SIDE};
 use crate::gpu::{
-    Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets, shaders, vk,
+    Buffer, DepthTest, Gpu, GraphicsDesc, Image, Layers, Program, Recorder, Resource, Sampler, Targets,
+    shaders, vk,
 };
 use crate::plan::Plan;
 use crate::scene::{Scene, Sky};
@@ -72,7 +73,7 @@ impl SeenGround {
     ) {
         let colors: Vec<_> = targets.quads.iter().map(|q| q.attachment(Some([0.0; 4]), false)).collect();
         let depth = Some(targets.depth.attachment(Some([0.0; 4]), false));
-        recorder.render("terrain", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
+        recorder.render("terrain", &Targets { colors: &colors, depth, layers: Layers::One(0) }, |pass| {
             pass.bind(
                 &self.mesh,
                 &[

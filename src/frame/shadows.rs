@@ -13,8 +13,8 @@ use crate::forest::species::SpeciesData;
 use crate::forest::terrain::TerrainData;
 use crate::gpu::interface::{GroundCaster, SHADOW_CELLS, SHADOW_PAGES, ShadowBlock};
 use crate::gpu::{
-    Attachment, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, RenderPass,
-    Resource, Sampler, Targets, shaders, vk,
+    Attachment, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Layers, Program, Recorder,
+    RenderPass, Resource, Sampler, Targets, shaders, vk,
 };
 use crate::land::quadtree::Quadtree;
 use crate::plan::Plan;
@@ -40,6 +40,8 @@ pub struct Shadows {
     /// What this frame draws.
     pub work: ShadowWork,
     held: Held,
+    /// Layers that are drawn together, one after the other.
+    layers: Vec<Layers>,
     blocks: Buffer,
     sums: Buffer,
     squares: Buffer,
@@ -96,21 +98,28 @@ impl Shadows {
         };
         let s = &scene.settings;
         let views = [("VIEW_RINGS", s.view_rings), ("VIEW_RESOLUTION", (s.view_resolution as f32).to_bits())];
+        let chosen = gpu.info().vertex_layers;
+        let (ground, trees) = match chosen {
+            true => (&shaders::FRAME_TERRAIN_SHADOW_VERT, &shaders::FRAME_TREES_ZFIELD_SHADOW_VERT),
+            false => {
+                (&shaders::FRAME_TERRAIN_SHADOW_LAYER_VERT, &shaders::FRAME_TREES_ZFIELD_SHADOW_LAYER_VERT)
+            }
+        };
         // Level ground shades nothing.
         let ground = (on && scene.terrain.heights.is_some())
-            .then(|| program(&shaders::FRAME_TERRAIN_SHADOW_VERT, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[]));
-        let trees = (on && plan.z_fields).then(|| {
-            program(
-                &shaders::FRAME_TREES_ZFIELD_SHADOW_VERT,
-                &shaders::FRAME_TREES_ZFIELD_SHADOW_FRAG,
-                &views,
-            )
-        });
+            .then(|| program(ground, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[]));
+        let trees =
+            (on && plan.z_fields).then(|| program(trees, &shaders::FRAME_TREES_ZFIELD_SHADOW_FRAG, &views));
         let side = SHADOW_CELLS + 1;
         let cells = (0..SHADOW_CELLS * SHADOW_CELLS).map(|k| k % SHADOW_CELLS + side * (k / SHADOW_CELLS));
         let indices: Vec<u32> =
             cells.flat_map(|k| [k, k + 1, k + side + 1, k, k + side + 1, k + side]).collect();
+        let layers = map.layers();
         Ok(Shadows {
+            layers: match chosen {
+                true => vec![Layers::Chosen(layers)],
+                false => (0..layers).map(Layers::One).collect(),
+            },
             map,
             work: ShadowWork::default(),
             held: Held::default(),
@@ -197,11 +206,6 @@ impl Shadows {
         if self.map.size() == [1; 2] {
             return;
         }
-        let targets = Targets {
-            colors: &[],
-            depth: Some(Attachment { image: &self.map, resolve: None, clear: None }),
-            layers: self.map.layers(),
-        };
         let batches = trees.map_or(0, |t| t.data.work.batches.len());
         for batch in 0..batches.max(1) {
             if let Some(t) = trees.filter(|_| !work.blocks.is_empty()) {
@@ -212,25 +216,30 @@ impl Shadows {
                 let buffers = (&self.blocks, &self.sums);
                 t.data.record(recorder, view, buffers, t.seeds, t.species, batch);
             }
-            recorder.render("shadows", &targets, |pass| {
-                if batch == 0 {
-                    self.draw_ground(pass, terrain, work);
-                }
-                if let (Some(program), Some(t)) = (&self.programs.trees, trees) {
-                    self.draw_trees(pass, program, view, work, t, batch);
-                }
-            });
+            for layers in &self.layers {
+                let depth = Some(Attachment { image: &self.map, resolve: None, clear: None });
+                let targets = Targets { colors: &[], depth, layers: *layers };
+                recorder.render("shadows", &targets, |pass| {
+                    if batch == 0 {
+                        self.draw_ground(pass, terrain, work, *layers);
+                    }
+                    if let (Some(program), Some(t)) = (&self.programs.trees, trees) {
+                        self.draw_trees(pass, program, view, (work, *layers), t, batch);
+                    }
+                });
+            }
         }
     }
 
     /// Clears the pages, and draws the ground.
-    fn draw_ground(&self, pass: &mut RenderPass, terrain: &TerrainData, work: &ShadowWork) {
-        for b in &work.blocks {
+    fn draw_ground(&self, pass: &mut RenderPass, terrain: &TerrainData, work: &ShadowWork, layers: Layers) {
+        for b in work.blocks.iter().filter(|b| b.in_layers(layers)) {
+            let layer = if let Layers::One(_) = layers { 0 } else { b.cascade as u32 };
             let page = self.page();
             let texel = |at: usize, shift: i64| (at as i64 - shift) as u32 * page;
             for [low, high] in b.pages.rectangles() {
                 let [low, high] = [low, high].map(|p| [0, 1].map(|k| texel(p[k], b.block.shift[k])));
-                pass.clear_depth([low, high], b.cascade as u32, 0.0);
+                pass.clear_depth([low, high], layer, 0.0);
             }
         }
         let Some(ground) = &self.programs.ground else { return };
@@ -245,7 +254,8 @@ impl Shadows {
             ],
         );
         let p = terrain.parameters(0);
-        for (b, (first, count)) in work.blocks.iter().zip(&work.ground) {
+        let blocks = work.blocks.iter().zip(&work.ground);
+        for (b, (first, count)) in blocks.filter(|(b, _)| b.in_layers(layers)) {
             self.scissor(pass, b);
             let (last, step, texels_per_step) = (p.last, p.step, p.texels_per_step);
             pass.push(&GroundPush { block: b.gpu, last, step, texels_per_step });
@@ -258,7 +268,7 @@ impl Shadows {
         pass: &mut RenderPass,
         program: &Program,
         view: &Buffer,
-        work: &ShadowWork,
+        (work, layers): (&ShadowWork, Layers),
         trees: CastingTrees,
         batch: usize,
     ) {
@@ -275,6 +285,9 @@ impl Shadows {
         );
         for block in &b.blocks {
             let drawn = &work.blocks[*block];
+            if !drawn.in_layers(layers) {
+                continue;
+            }
             self.scissor(pass, drawn);
             pass.push(&drawn.gpu);
             let command = trees.data.work.command(batch, *block);

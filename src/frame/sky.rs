@@ -4,8 +4,8 @@ use super::targets::ImageTargets;
 use crate::Result;
 use crate::camera::Light;
 use crate::gpu::{
-    Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Recorder, Resource, Sampler, Targets,
-    shaders, vk,
+    Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Layers, Program, Recorder, Resource, Sampler,
+    Targets, shaders, vk,
 };
 use crate::plan::{Plan, Rasterizer};
 use crate::scene::{Scene, Sky};
@@ -56,7 +56,7 @@ impl SkyPass {
     /// Records the pass.
     pub fn record(&self, recorder: &mut Recorder, view: &Buffer, targets: &ImageTargets) {
         let colors: Vec<_> = targets.colors.iter().map(|t| t.attachment(Some([0.0; 4]), false)).collect();
-        recorder.render("sky", &Targets { colors: &colors, depth: None, layers: 1 }, |pass| {
+        recorder.render("sky", &Targets { colors: &colors, depth: None, layers: Layers::One(0) }, |pass| {
             let sky = ("sky", Resource::Texture(&self.image, Sampler::LinearRepeat));
             pass.bind(&self.program, &[("view", Resource::Buffer(view)), sky]);
             pass.draw(3, 1);

@@ -57,6 +57,9 @@ pub struct GpuOptions {
     pub device: Option<String>,
     /// What the validation layers watch.
     pub validation: Validation,
+    /// Do without what not every device has, though this one has it: for tests.
+    #[doc(hidden)]
+    pub frugal: bool,
 }
 
 /// An open Vulkan device. Cheap to clone; the device closes with the last clone or resource.
@@ -68,7 +71,8 @@ pub struct Gpu {
 /// What every resource keeps alive.
 pub(super) struct Shared {
     pub device: ash::Device,
-    pub push: khr::push_descriptor::Device,
+    /// Descriptors with the commands that use them; without, sets come from pools.
+    pub push: Option<khr::push_descriptor::Device>,
     pub names: Option<ext::debug_utils::Device>,
     pub queue: vk::Queue,
     /// The queue's family.
@@ -87,8 +91,6 @@ pub(super) struct Shared {
     pub heap_bytes: Mutex<[u64; vk::MAX_MEMORY_HEAPS]>,
     pub samplers: Vec<vk::Sampler>,
     pub info: DeviceInfo,
-    /// Descriptor sets come from pools instead of being pushed.
-    pub pool_sets: bool,
     pub timing: TimingState,
     pub failures: Failures,
     // Last: the instance must outlive everything made through it.
@@ -197,9 +199,11 @@ impl Gpu {
         if validate {
             root.messenger = Some(listen(&root._entry, &instance, &root.messages)?);
         }
-        let (physical, info) = choose(&instance, options.device.as_deref())?;
-        let mut shared = open(root, physical, info, debug_utils, failures)?;
-        shared.pool_sets = options.validation == Validation::GpuAssisted;
+        let (physical, mut info) = choose(&instance, options.device.as_deref())?;
+        info.vertex_layers &= !options.frugal;
+        // GPU-assisted validation (1.3.239) takes pushed descriptors for uninitialised, and checks nothing behind them.
+        info.push_descriptors &= !options.frugal && options.validation != Validation::GpuAssisted;
+        let shared = open(root, physical, info, debug_utils, failures)?;
         Ok(Gpu { shared: Arc::new(shared) })
     }
 
@@ -344,12 +348,13 @@ fn open(
         let queue_info =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
         let calibration = calibration_extension(&root._entry, &instance, physical);
-        let extensions: Vec<_> =
-            [Some(khr::push_descriptor::NAME), calibration].into_iter().flatten().map(CStr::as_ptr).collect();
+        let push = info.push_descriptors.then_some(khr::push_descriptor::NAME);
+        let extensions: Vec<_> = [push, calibration].into_iter().flatten().map(CStr::as_ptr).collect();
         let features =
             vk::PhysicalDeviceFeatures::default().pipeline_statistics_query(info.pipeline_statistics);
-        let mut f12 =
-            vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true).shader_output_layer(true);
+        let mut f12 = vk::PhysicalDeviceVulkan12Features::default()
+            .timeline_semaphore(true)
+            .shader_output_layer(info.vertex_layers);
         let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
             .synchronization2(true)
             .dynamic_rendering(true)
@@ -377,7 +382,7 @@ fn open(
             memory: instance.get_physical_device_memory_properties(physical),
             pipelines: Mutex::default(),
             heap_bytes: Mutex::new([0; vk::MAX_MEMORY_HEAPS]),
-            push: khr::push_descriptor::Device::new(&instance, &device),
+            push: push.map(|_| khr::push_descriptor::Device::new(&instance, &device)),
             names: debug_utils.then(|| ext::debug_utils::Device::new(&instance, &device)),
             queue: device.get_device_queue(family, 0),
             family,
@@ -390,7 +395,6 @@ fn open(
             samplers: Vec::new(),
             info,
             failures,
-            pool_sets: false,
             root,
         };
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);

@@ -7,6 +7,7 @@ use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use gpu_allocator::{AllocationError, MemoryLocation};
 
 use super::context::{Gpu, Shared, device_error, lock};
+use super::record::Layers;
 use crate::{Error, Result};
 
 /// A buffer on the device, or visible to the host for transfers.
@@ -45,6 +46,8 @@ pub struct Image {
     pub(super) handle: vk::Image,
     pub(super) view: vk::ImageView,
     pub(super) level_views: Vec<vk::ImageView>,
+    /// Views of single layers, of depth images with several where vertices do not choose among them.
+    layer_views: Vec<vk::ImageView>,
     allocation: Option<Allocation>,
     format: vk::Format,
     size: [u32; 2],
@@ -282,6 +285,7 @@ impl Gpu {
                 handle,
                 view: view.unwrap_or_default(),
                 level_views: Vec::new(),
+                layer_views: Vec::new(),
                 allocation: Some(allocation),
                 format: d.format,
                 size: d.size,
@@ -292,18 +296,30 @@ impl Gpu {
             view.map_err(device_error(d.name))?;
             s.name(handle, d.name);
             s.name(image.view, d.name);
+            let one = |range: vk::ImageSubresourceRange| {
+                let create = vk::ImageViewCreateInfo::default()
+                    .image(handle)
+                    .view_type(vk::ImageViewType::TYPE_2D_ARRAY)
+                    .format(d.format)
+                    .subresource_range(range);
+                let made = s.failures.memory().and_then(|()| s.device.create_image_view(&create, None));
+                made.map_err(device_error(d.name))
+            };
             if d.levels > 1 && d.usage.contains(vk::ImageUsageFlags::STORAGE) {
                 for level in 0..d.levels {
                     let range =
                         vk::ImageSubresourceRange { base_mip_level: level, level_count: 1, ..whole(aspect) };
-                    let one = vk::ImageViewCreateInfo::default()
-                        .image(handle)
-                        .view_type(vk::ImageViewType::TYPE_2D_ARRAY)
-                        .format(d.format)
-                        .subresource_range(range);
-                    let free = s.failures.memory();
-                    let made = free.and_then(|()| s.device.create_image_view(&one, None));
-                    image.level_views.push(made.map_err(device_error(d.name))?);
+                    image.level_views.push(one(range)?);
+                }
+            }
+            if d.layers > 1 && aspect == vk::ImageAspectFlags::DEPTH && !self.info().vertex_layers {
+                for layer in 0..d.layers {
+                    let range = vk::ImageSubresourceRange {
+                        base_array_layer: layer,
+                        layer_count: 1,
+                        ..whole(aspect)
+                    };
+                    image.layer_views.push(one(range)?);
                 }
             }
             image
@@ -403,6 +419,14 @@ impl Image {
         self.format
     }
 
+    /// The view for drawing to layers.
+    pub(super) fn drawn(&self, layers: Layers) -> vk::ImageView {
+        match layers {
+            Layers::One(layer) => self.layer_views.get(layer as usize).copied().unwrap_or(self.view),
+            Layers::Chosen(_) => self.view,
+        }
+    }
+
     pub(super) fn aspect(&self) -> vk::ImageAspectFlags {
         if self.format == vk::Format::D32_SFLOAT {
             vk::ImageAspectFlags::DEPTH
@@ -424,6 +448,7 @@ impl Drop for Image {
     fn drop(&mut self) {
         if let Some(a) = self.allocation.take() {
             let mut views = std::mem::take(&mut self.level_views);
+            views.append(&mut self.layer_views);
             views.push(self.view);
             self.shared.retire(Retired::Image(self.handle, views, a));
         }

@@ -31,9 +31,9 @@ pub use memory::{Buffer, Image, ImageDesc};
 pub use program::{DepthTest, GraphicsDesc, Program, Sampler};
 #[doc(hidden)]
 pub use record::Fault;
-pub use record::{Attachment, ComputePass, Recorder, RenderPass, Resource, Targets, Work};
+pub use record::{Attachment, ComputePass, Layers, Recorder, RenderPass, Resource, Targets, Work};
 pub use ring::{Done, InFlight, Later, Ring};
-pub use select::{DeviceInfo, devices, find};
+pub use select::{DeviceInfo, devices, find, tree_components};
 pub use timing::{PassTime, PipelineStatistics, Stamps, Timing, TimingOptions};
 
 /// A descriptor binding of a shader, from reflection; every binding is in set 0.
@@ -56,6 +56,10 @@ pub struct Shader {
     pub stage: vk::ShaderStageFlags,
     /// Bytes of its push constants.
     pub push_constant_bytes: u32,
+    /// Locations that it writes, of four components each.
+    pub locations: u32,
+    /// Invocations a workgroup; 1 outside compute.
+    pub invocations: u32,
     /// SPIR-V words as bytes.
     pub spirv: &'static [u8],
     /// Its bindings, sorted.

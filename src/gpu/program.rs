@@ -235,9 +235,9 @@ impl Gpu {
         let ranges = [vk::PushConstantRange::default().stage_flags(stage_flags).offset(0).size(push_bytes)];
         // SAFETY: the device is alive; the set layout outlives the pipeline layout.
         unsafe {
-            let pushed = match s.pool_sets {
-                true => vk::DescriptorSetLayoutCreateFlags::empty(),
-                false => vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR,
+            let pushed = match s.push {
+                None => vk::DescriptorSetLayoutCreateFlags::empty(),
+                Some(_) => vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR,
             };
             let create = vk::DescriptorSetLayoutCreateInfo::default().flags(pushed).bindings(&layout);
             let free = s.failures.memory();

@@ -9,7 +9,6 @@ use super::context::{Gpu, device_error};
 use super::memory::{Buffer, Image};
 use super::program::{Program, Sampler};
 use super::ring::{InFlight, Later, Ring, Slot, Wanted};
-use super::sets;
 use super::timing::{MAX_SCOPES, Queries, Scope, Stamps, Timing, TimingOptions};
 use crate::clock::{monotonic_ns, process_cpu_ms_since, process_cpu_ns};
 use crate::{Error, Result};
@@ -47,8 +46,17 @@ pub struct Targets<'a> {
     pub colors: &'a [Attachment<'a>],
     /// Depth attachment.
     pub depth: Option<Attachment<'a>>,
-    /// First layer drawn to, when `layers` is 1; images with more are drawn whole.
-    pub layers: u32,
+    /// Layers drawn to.
+    pub layers: Layers,
+}
+
+/// Which layers of its targets a pass draws to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layers {
+    /// This one.
+    One(u32),
+    /// So many from the first on: vertices choose, on devices where they can ([`super::DeviceInfo::vertex_layers`]).
+    Chosen(u32),
 }
 
 /// What [`Recorder::fault_for_test`] does wrong.
@@ -373,7 +381,7 @@ impl<'g> Recorder<'g> {
         let [width, height] = first.image.size();
         let info = |a: &Attachment, depth: bool| {
             let mut info = vk::RenderingAttachmentInfo::default()
-                .image_view(a.image.view)
+                .image_view(a.image.drawn(targets.layers))
                 .image_layout(vk::ImageLayout::GENERAL)
                 .store_op(vk::AttachmentStoreOp::STORE)
                 .load_op(vk::AttachmentLoadOp::LOAD);
@@ -405,7 +413,7 @@ impl<'g> Recorder<'g> {
         let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
         let mut begin = vk::RenderingInfo::default()
             .render_area(area)
-            .layer_count(targets.layers)
+            .layer_count(if let Layers::Chosen(count) = targets.layers { count } else { 1 })
             .color_attachments(&colors);
         if let Some(d) = &depth {
             begin = begin.depth_attachment(d);
@@ -600,14 +608,19 @@ impl Work<'_, '_> {
         // dropping only retires them.
         unsafe {
             s.device.cmd_bind_pipeline(self.recorder.cmd, program.bind_point, program.pipeline);
-            if !writes.is_empty() && s.pool_sets {
-                if let Err(e) = sets::bind(s, self.recorder.cmd, program, &writes) {
-                    self.recorder.error.get_or_insert(device_error("descriptor set")(e));
-                    return;
+            match (&s.push, &mut self.recorder.slot) {
+                _ if writes.is_empty() => (),
+                (Some(push), _) => {
+                    let (cmd, layout) = (self.recorder.cmd, program.layout);
+                    push.cmd_push_descriptor_set(cmd, program.bind_point, layout, 0, &writes);
                 }
-            } else if !writes.is_empty() {
-                let (cmd, layout) = (self.recorder.cmd, program.layout);
-                s.push.cmd_push_descriptor_set(cmd, program.bind_point, layout, 0, &writes);
+                (None, Some(slot)) => {
+                    if let Err(e) = slot.sets.bind(self.recorder.cmd, program, &writes) {
+                        self.recorder.error.get_or_insert(device_error("descriptor set")(e));
+                        return;
+                    }
+                }
+                (None, None) => return,
             }
         }
         self.program = Some((program.layout, program.stages, program.push_bytes));

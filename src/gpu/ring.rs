@@ -13,12 +13,13 @@ use gpu_allocator::MemoryLocation;
 
 use super::context::{Gpu, Shared, device_error, lock};
 use super::memory::{Buffer, Retired};
+use super::sets::SetPools;
 use super::timing::{Queries, Scope, Timing, TimingOptions};
 use crate::clock::monotonic_ns;
 use crate::{Error, Result};
 
 /// Bytes of a slot's first piece of memory.
-const FIRST_PIECE: u64 = 1 << 16;
+const FIRST_PIECE: u64 = 1 << 12;
 
 /// Slots for recordings of which several are in flight. Cheap to clone; its memory goes with its last owner.
 #[derive(Clone, Default)]
@@ -33,6 +34,7 @@ pub(super) struct Slot {
     pub commands: vk::CommandBuffer,
     pub queries: Option<Queries>,
     pub uploads: Arena,
+    pub sets: SetPools,
     reads: Arena,
 }
 
@@ -96,6 +98,7 @@ impl Slot {
             pool: vk::CommandPool::null(),
             commands: vk::CommandBuffer::null(),
             queries: None,
+            sets: SetPools::new(s),
             uploads: Arena::new("uploads", MemoryLocation::CpuToGpu),
             reads: Arena::new("read-backs", MemoryLocation::GpuToCpu),
         };
@@ -134,6 +137,7 @@ impl Slot {
     pub fn prepare(&mut self, gpu: &Gpu, statistics: bool) -> Result<Queries> {
         self.uploads.reset();
         self.reads.reset();
+        self.sets.reset();
         if let Some(q) = self.queries.filter(|q| q.statistics.is_some() == statistics) {
             return Ok(q);
         }

@@ -5,6 +5,7 @@ use std::ffi::CStr;
 use ash::vk;
 
 use super::context::load_entry;
+use super::{Shader, shaders};
 use crate::{Error, Result};
 
 /// What a device is and can do, as far as it matters here.
@@ -38,6 +39,12 @@ pub struct DeviceInfo {
     pub timestamp_ns: f32,
     /// It counts what the pipeline does.
     pub pipeline_statistics: bool,
+    /// Most components that a vertex shader passes on: the graphics rasteriser of trees takes [`tree_components`].
+    pub max_vertex_components: u32,
+    /// Resources are bound with the commands that use them; otherwise from pools, which takes a little longer.
+    pub push_descriptors: bool,
+    /// Vertex shaders choose the layer that they draw to; otherwise each layer is drawn by itself.
+    pub vertex_layers: bool,
     /// Why canopy cannot use it; empty if it can.
     pub missing: Vec<String>,
 }
@@ -120,6 +127,56 @@ pub(super) fn choose(
     })
 }
 
+/// Components that the vertex shader of the graphics rasteriser's trees passes on.
+pub fn tree_components() -> u32 {
+    4 * shaders::FRAME_TREES_ZFIELD_VERT.locations
+}
+
+/// Which limits are under what the shaders take, and by how much. What Vulkan promises everywhere is not asked for.
+fn short(l: &vk::PhysicalDeviceLimits) -> Vec<String> {
+    let most = |of: &dyn Fn(&Shader) -> u32| shaders::ALL.iter().map(|s| of(s)).max().unwrap_or(0);
+    let kinds = |s: &Shader, kinds: &[vk::DescriptorType]| {
+        s.bindings.iter().filter(|b| kinds.contains(&b.kind)).count() as u32
+    };
+    let sampled = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER, vk::DescriptorType::UNIFORM_TEXEL_BUFFER];
+    // Trees in the graphics pipeline are left to devices that pass so much on; everything else is not.
+    let trees = shaders::FRAME_TREES_ZFIELD_VERT.name;
+    let components = |s: &Shader| if s.name == trees { 0 } else { 4 * s.locations };
+    let all = [
+        ("maxPushConstantsSize", l.max_push_constants_size, most(&|s| s.push_constant_bytes)),
+        (
+            "maxPerStageDescriptorStorageBuffers",
+            l.max_per_stage_descriptor_storage_buffers,
+            most(&|s| kinds(s, &[vk::DescriptorType::STORAGE_BUFFER])),
+        ),
+        (
+            "maxPerStageDescriptorUniformBuffers",
+            l.max_per_stage_descriptor_uniform_buffers,
+            most(&|s| kinds(s, &[vk::DescriptorType::UNIFORM_BUFFER])),
+        ),
+        (
+            "maxPerStageDescriptorSampledImages",
+            l.max_per_stage_descriptor_sampled_images,
+            most(&|s| kinds(s, &sampled)),
+        ),
+        (
+            "maxPerStageDescriptorStorageImages",
+            l.max_per_stage_descriptor_storage_images,
+            most(&|s| kinds(s, &[vk::DescriptorType::STORAGE_IMAGE])),
+        ),
+        ("maxPerStageResources", l.max_per_stage_resources, most(&|s| s.bindings.len() as u32)),
+        ("maxComputeWorkGroupInvocations", l.max_compute_work_group_invocations, most(&|s| s.invocations)),
+        (
+            "maxVertexOutputComponents",
+            l.max_vertex_output_components.min(l.max_fragment_input_components),
+            most(&components),
+        ),
+        ("maxColorAttachments", l.max_color_attachments, 4),
+    ];
+    let short = all.into_iter().filter(|(_, has, takes)| has < takes);
+    short.map(|(name, has, takes)| format!("{name} {takes} (has {has})")).collect()
+}
+
 fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
     // SAFETY: the instance and device are alive; each chain is built of fresh structs.
     let (base, memory, families, extensions) = unsafe {
@@ -135,9 +192,12 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
         String::from_utf8_lossy(&bytes).into_owned()
     };
     let mut missing = Vec::new();
-    let mut pipeline_statistics = false;
-    let (mut id, mut driver) =
-        (vk::PhysicalDeviceIDProperties::default(), vk::PhysicalDeviceDriverProperties::default());
+    let (mut pipeline_statistics, mut vertex_layers) = (false, false);
+    let (mut id, mut driver, mut integers) = (
+        vk::PhysicalDeviceIDProperties::default(),
+        vk::PhysicalDeviceDriverProperties::default(),
+        vk::PhysicalDeviceVulkan12Properties::default(),
+    );
     let api = base.api_version;
     if api < vk::API_VERSION_1_3 {
         missing.push("Vulkan 1.3".to_string());
@@ -146,32 +206,33 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
         let mut f13 = vk::PhysicalDeviceVulkan13Features::default();
         let mut f = vk::PhysicalDeviceFeatures2::default().push_next(&mut f12).push_next(&mut f13);
         let mut props = vk::PhysicalDeviceProperties2::default().push_next(&mut id).push_next(&mut driver);
+        props = props.push_next(&mut integers);
         // SAFETY: as above.
         unsafe {
             instance.get_physical_device_features2(p, &mut f);
             instance.get_physical_device_properties2(p, &mut props);
         }
         pipeline_statistics = f.features.pipeline_statistics_query == vk::TRUE;
+        vertex_layers = f12.shader_output_layer == vk::TRUE;
         for (has, what) in [
             (f13.synchronization2, "synchronization2"),
             (f13.dynamic_rendering, "dynamicRendering"),
             (f13.maintenance4, "maintenance4"),
             (f12.timeline_semaphore, "timelineSemaphore"),
-            (f12.shader_output_layer, "shaderOutputLayer"),
         ] {
             if has == vk::FALSE {
                 missing.push(what.to_string());
             }
         }
     }
-    if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::khr::push_descriptor::NAME)) {
-        missing.push("VK_KHR_push_descriptor".to_string());
-    }
+    let push_descriptors =
+        extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::khr::push_descriptor::NAME));
     let all_work = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
     if !families.iter().any(|q| q.queue_flags.contains(all_work) && q.timestamp_valid_bits > 0) {
         missing.push("a graphics and compute queue with timestamps".to_string());
     }
     let l = &base.limits;
+    missing.extend(short(l));
     let driver_name = text(&driver.driver_name);
     // SAFETY: driver_info is a NUL-terminated array filled by the driver, or zeros.
     let driver_info = unsafe { CStr::from_ptr(driver.driver_info.as_ptr()) }.to_string_lossy().into_owned();
@@ -202,9 +263,17 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
             .filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
             .map(|h| h.size)
             .sum(),
-        sample_counts: (l.framebuffer_color_sample_counts & l.framebuffer_depth_sample_counts).as_raw(),
+        sample_counts: (l.framebuffer_color_sample_counts
+            & l.framebuffer_depth_sample_counts
+            & l.sampled_image_depth_sample_counts
+            & l.sampled_image_integer_sample_counts
+            & integers.framebuffer_integer_color_sample_counts)
+            .as_raw(),
         timestamp_ns: l.timestamp_period,
         pipeline_statistics,
+        max_vertex_components: l.max_vertex_output_components.min(l.max_fragment_input_components),
+        push_descriptors,
+        vertex_layers,
         missing,
     }
 }

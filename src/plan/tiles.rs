@@ -1,8 +1,8 @@
 //! What finds the samples of trees, and what compute tiles take for that.
 
 use super::{Plan, Representation};
-use crate::gpu::DeviceInfo;
 use crate::gpu::interface::{BIN_LANES, DEPTH_BINS, ORDER_LANES, SIGHT_TEXELS, TileState};
+use crate::gpu::{DeviceInfo, tree_components};
 use crate::{Error, Result};
 
 /// Steps of writing the lists (trees, and entries): an invocation takes 1/64 of them, and drivers end loops after 65,535 turns.
@@ -220,6 +220,16 @@ impl Plan {
     ) -> Result<()> {
         let beyond = device.and_then(|d| TileBuffers::new(self).beyond(d));
         let cpu = device.is_none_or(|d| d.kind == "cpu");
+        let narrow = device.filter(|d| self.z_fields && d.max_vertex_components < tree_components());
+        if let Some(d) = narrow.filter(|_| wanted == Some(Rasterizer::Graphics) || beyond.is_some()) {
+            return Err(Error::Usage(format!(
+                "--rasterizer graphics: {} passes {} components from vertices to fragments, and its trees take {}: use --rasterizer \
+                 tiles, for fewer trees or a smaller picture if need be",
+                d.name,
+                d.max_vertex_components,
+                tree_components()
+            )));
+        }
         self.rasterizer = match (wanted, beyond) {
             (Some(Rasterizer::Tiles), Some(why)) => {
                 return Err(Error::Usage(format!(
@@ -227,7 +237,7 @@ impl Plan {
                 )));
             }
             (Some(rasterizer), _) => rasterizer,
-            (None, None) if cpu => Rasterizer::Tiles,
+            (None, None) if cpu || narrow.is_some() => Rasterizer::Tiles,
             (None, _) => Rasterizer::Graphics,
         };
         Ok(())

@@ -17,7 +17,12 @@ use canopy::scene::{self, Camera, Scene};
 
 /// A device with core and synchronization validation. Without one the test fails: it must not pass unseen.
 pub fn open() -> Gpu {
-    Gpu::new(&GpuOptions { device: None, validation: Validation::Full })
+    open_with(&GpuOptions { validation: Validation::Full, ..GpuOptions::default() })
+}
+
+/// A device as these options say.
+pub fn open_with(options: &GpuOptions) -> Gpu {
+    Gpu::new(options)
         .unwrap_or_else(|e| panic!("this test needs a Vulkan 1.3 device and the validation layer: {e}"))
 }
 

@@ -248,7 +248,9 @@ fn the_plan_knows_what_will_be_allocated() {
     let scene = scene();
     for rasterizer in RASTERIZERS {
         let drawn = draw(&gpu, &scene, rasterizer);
-        let allocated: u64 = drawn.allocated.iter().map(|(_, b)| b).sum();
+        // What frames are uploaded and read back through is not the scene's: it is as large as the frames in flight take.
+        let ring = |name: &str| ["uploads", "read-backs"].contains(&name);
+        let allocated: u64 = drawn.allocated.iter().filter(|(n, _)| !ring(n)).map(|(_, b)| b).sum();
         println!("planned {} KiB, allocated {} KiB", drawn.planned >> 10, allocated >> 10);
         // Small buffers (view, indices, tables) are not worth an item each: a tenth, and a MiB.
         assert!(allocated <= drawn.planned + drawn.planned / 10 + (1 << 20), "{:?}", drawn.allocated);

@@ -6,7 +6,8 @@ use crate::frame::Forest;
 use crate::frame::targets::ImageTargets;
 use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand};
 use crate::gpu::{
-    Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets, shaders,
+    Buffer, DepthTest, Gpu, GraphicsDesc, Image, Layers, Program, Recorder, Resource, Sampler, Targets,
+    shaders,
 };
 use crate::plan::{Plan, ViewMode};
 use crate::scene::Scene;
@@ -79,7 +80,7 @@ impl Trees {
     ) {
         let colors: Vec<_> = targets.colors.iter().map(|t| t.attachment(None, true)).collect();
         let depth = Some(targets.depth.attachment(None, true));
-        recorder.render("trees", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
+        recorder.render("trees", &Targets { colors: &colors, depth, layers: Layers::One(0) }, |pass| {
             if forest.seeds.visible == 0 {
                 return;
             }

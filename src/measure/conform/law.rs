@@ -3,8 +3,8 @@
 use super::{Finding, finding};
 use crate::Result;
 use crate::gpu::{
-    Attachment, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Program, Resource, Targets, shaders,
-    vk,
+    Attachment, Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Layers, Program, Resource, Targets,
+    shaders, vk,
 };
 use crate::physics::masks::combination_table;
 
@@ -90,11 +90,15 @@ impl Target {
             None => Attachment { image: &self.single, resolve: None, clear: Some([0.0; 4]) },
         };
         let mut recorder = gpu.record()?;
-        recorder.render("masks", &Targets { colors: &[attachment], depth: None, layers: 1 }, |pass| {
-            pass.bind(&self.program, &[("masks", Resource::Buffer(&self.rows))]);
-            pass.push(&[alpha.to_bits(), 1000 * n + (alpha * 100.0) as u32]);
-            pass.draw(3, n);
-        });
+        recorder.render(
+            "masks",
+            &Targets { colors: &[attachment], depth: None, layers: Layers::One(0) },
+            |pass| {
+                pass.bind(&self.program, &[("masks", Resource::Buffer(&self.rows))]);
+                pass.push(&[alpha.to_bits(), 1000 * n + (alpha * 100.0) as u32]);
+                pass.draw(3, n);
+            },
+        );
         recorder.submit()?;
         let texels: Vec<[u16; 4]> = gpu.read_image(&self.single, 0, 0)?;
         let sum: f64 = texels.iter().map(|t| half::f16::from_bits(t[0]).to_f64()).sum();

@@ -22,7 +22,13 @@ const SCENES: [&str; 3] = ["grove", "hills", "overcast"];
 
 /// Provokes a message, then draws without any.
 pub(super) fn check(options: &Options, (_, validation, hint): &Watch) -> Result<Finding> {
-    let open = || Gpu::new(&GpuOptions { device: options.device.clone(), validation: *validation });
+    let open = || {
+        Gpu::new(&GpuOptions {
+            device: options.device.clone(),
+            validation: *validation,
+            ..Default::default()
+        })
+    };
     let mut problems = Vec::new();
     let gpu = open()?;
     provoke(&gpu, *validation)?;
