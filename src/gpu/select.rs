@@ -33,7 +33,7 @@ pub struct DeviceInfo {
     pub max_texel_elements: u32,
     /// Sum of the device-local heaps, bytes.
     pub device_bytes: u64,
-    /// Sample counts that colour and depth both take, as a bit mask (1 | 4 | 8 …).
+    /// Sample counts that colours, integers and depth all take, as a bit mask (1 | 4 | 8 …).
     pub sample_counts: u32,
     /// Nanoseconds a timestamp tick.
     pub timestamp_ns: f32,
@@ -177,6 +177,26 @@ fn short(l: &vk::PhysicalDeviceLimits) -> Vec<String> {
     short.map(|(name, has, takes)| format!("{name} {takes} (has {has})")).collect()
 }
 
+/// Sample counts that all multisampled targets take: colours, what samples see, and depth.
+fn sample_counts(instance: &ash::Instance, p: vk::PhysicalDevice) -> vk::SampleCountFlags {
+    use vk::ImageUsageFlags as Usage;
+    let targets = [
+        (vk::Format::R16G16B16A16_SFLOAT, Usage::COLOR_ATTACHMENT | Usage::SAMPLED),
+        (vk::Format::R32_UINT, Usage::COLOR_ATTACHMENT | Usage::SAMPLED),
+        (vk::Format::D32_SFLOAT, Usage::DEPTH_STENCIL_ATTACHMENT | Usage::SAMPLED),
+    ];
+    let (kind, tiling, flags) =
+        (vk::ImageType::TYPE_2D, vk::ImageTiling::OPTIMAL, vk::ImageCreateFlags::empty());
+    let counts = targets.map(|(format, usage)| {
+        // SAFETY: the instance and device are alive.
+        let found = unsafe {
+            instance.get_physical_device_image_format_properties(p, format, kind, tiling, usage, flags)
+        };
+        found.map_or(vk::SampleCountFlags::empty(), |f| f.sample_counts)
+    });
+    counts.into_iter().fold(vk::SampleCountFlags::from_raw(u32::MAX), |all, counts| all & counts)
+}
+
 fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
     // SAFETY: the instance and device are alive; each chain is built of fresh structs.
     let (base, memory, families, extensions) = unsafe {
@@ -193,11 +213,8 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
     };
     let mut missing = Vec::new();
     let (mut pipeline_statistics, mut vertex_layers) = (false, false);
-    let (mut id, mut driver, mut integers) = (
-        vk::PhysicalDeviceIDProperties::default(),
-        vk::PhysicalDeviceDriverProperties::default(),
-        vk::PhysicalDeviceVulkan12Properties::default(),
-    );
+    let (mut id, mut driver) =
+        (vk::PhysicalDeviceIDProperties::default(), vk::PhysicalDeviceDriverProperties::default());
     let api = base.api_version;
     if api < vk::API_VERSION_1_3 {
         missing.push("Vulkan 1.3".to_string());
@@ -206,7 +223,6 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
         let mut f13 = vk::PhysicalDeviceVulkan13Features::default();
         let mut f = vk::PhysicalDeviceFeatures2::default().push_next(&mut f12).push_next(&mut f13);
         let mut props = vk::PhysicalDeviceProperties2::default().push_next(&mut id).push_next(&mut driver);
-        props = props.push_next(&mut integers);
         // SAFETY: as above.
         unsafe {
             instance.get_physical_device_features2(p, &mut f);
@@ -263,12 +279,7 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
             .filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
             .map(|h| h.size)
             .sum(),
-        sample_counts: (l.framebuffer_color_sample_counts
-            & l.framebuffer_depth_sample_counts
-            & l.sampled_image_depth_sample_counts
-            & l.sampled_image_integer_sample_counts
-            & integers.framebuffer_integer_color_sample_counts)
-            .as_raw(),
+        sample_counts: sample_counts(instance, p).as_raw(),
         timestamp_ns: l.timestamp_period,
         pipeline_statistics,
         max_vertex_components: l.max_vertex_output_components.min(l.max_fragment_input_components),

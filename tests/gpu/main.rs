@@ -10,6 +10,7 @@ mod determinism;
 mod extremes;
 mod failures;
 mod faults;
+mod frugal;
 mod ground;
 mod handover;
 mod in_flight;
