@@ -540,6 +540,8 @@ impl Work<'_, '_> {
     /// Uses a program with its resources by name; every binding of the program must be named.
     pub fn bind(&mut self, program: &Program, resources: &[(&str, Resource)]) {
         let s = &self.recorder.gpu.shared;
+        // What cannot be bound is an error, and nothing runs without.
+        self.program = None;
         let mut buffers = Vec::with_capacity(program.bindings.len());
         let mut images = Vec::with_capacity(program.bindings.len());
         let mut views = Vec::with_capacity(program.bindings.len());
@@ -684,7 +686,7 @@ impl std::ops::DerefMut for RenderPass<'_, '_> {
 impl ComputePass<'_, '_> {
     /// Runs `groups` workgroups of the bound program.
     pub fn dispatch(&mut self, groups: [u32; 3]) {
-        if groups.contains(&0) {
+        if groups.contains(&0) || self.work.program.is_none() {
             return;
         }
         let r = &mut *self.work.recorder;
@@ -695,6 +697,9 @@ impl ComputePass<'_, '_> {
 
     /// Runs the bound program with the number of workgroups that stands at byte `offset` of `commands`.
     pub fn dispatch_indirect(&mut self, commands: &Buffer, offset: u64) {
+        if self.work.program.is_none() {
+            return;
+        }
         let r = &mut *self.work.recorder;
         r.dispatches += 1;
         // SAFETY: a program and its resources are bound; the buffer is alive and holds what the shader that wrote it put there.
@@ -731,6 +736,9 @@ impl RenderPass<'_, '_> {
 
     /// Draws `vertices` vertices without an index buffer.
     pub fn draw(&mut self, vertices: u32, instances: u32) {
+        if self.work.program.is_none() {
+            return;
+        }
         let r = &mut *self.work.recorder;
         r.draws += 1;
         // SAFETY: a program and its resources are bound.
@@ -739,6 +747,9 @@ impl RenderPass<'_, '_> {
 
     /// Draws with 32-bit indices; the arguments are the command at byte `offset` of `commands`.
     pub fn draw_indexed_indirect(&mut self, indices: &Buffer, commands: &Buffer, offset: u64) {
+        if self.work.program.is_none() {
+            return;
+        }
         let r = &mut *self.work.recorder;
         r.draws += 1;
         // SAFETY: both buffers are alive and hold what the shader that wrote them put there.
@@ -750,7 +761,7 @@ impl RenderPass<'_, '_> {
 
     /// Draws `count` 32-bit indices for each of the instances.
     pub fn draw_indexed(&mut self, indices: &Buffer, count: u32, instances: std::ops::Range<u32>) {
-        if instances.is_empty() {
+        if instances.is_empty() || self.work.program.is_none() {
             return;
         }
         let r = &mut *self.work.recorder;

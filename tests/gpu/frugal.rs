@@ -18,7 +18,8 @@ fn a_device_without_what_vulkan_does_not_promise_draws_the_same_bits() {
         let mut draw = |frame| {
             let report = renderer.render(&device::jump(&scene, frame), 1.0).unwrap();
             let shadows = report.timing.passes.iter().filter(|p| p.name == "shadows").count();
-            assert_eq!(shadows, if frugal { renderer.plan().cascades as usize } else { 1 });
+            let layers = if frugal { renderer.plan().cascades as usize } else { 1 };
+            assert!(shadows >= layers && shadows % layers == 0, "{shadows} passes for {layers} layers");
             (renderer.picture().unwrap(), report.trees)
         };
         let drawn: Vec<_> = (0..4).map(&mut draw).collect();
