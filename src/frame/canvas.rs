@@ -25,7 +25,7 @@ pub struct Canvas {
 /// What draws ground and trees; without trees drawn one by one, the ground alone.
 enum Passes {
     /// The graphics pipeline: what it finds it lights.
-    Graphics(Box<Ground>, Option<Trees>),
+    Graphics(Box<Ground>, Option<Box<Trees>>),
     /// Compute tiles: what is seen is found first, and lit once.
     Tiles(Box<SeenGround>, Option<Box<TreeTiles>>),
 }
@@ -42,7 +42,7 @@ impl Canvas {
             passes: match plan.rasterizer {
                 Rasterizer::Graphics => {
                     let trees = rows.map(|rows| Trees::new(gpu, scene, plan, rows)).transpose()?;
-                    Passes::Graphics(Box::new(Ground::new(gpu, plan)?), trees)
+                    Passes::Graphics(Box::new(Ground::new(gpu, plan)?), trees.map(Box::new))
                 }
                 Rasterizer::Tiles => {
                     let trees = rows.map(|rows| TreeTiles::new(gpu, scene, plan, rows)).transpose()?;
@@ -72,7 +72,7 @@ impl Canvas {
             }
             match &self.passes {
                 Passes::Graphics(pass, trees) => {
-                    self.graphics(r, world, streamed, moment, (pass, trees.as_ref()));
+                    self.graphics(r, world, streamed, moment, (pass, trees.as_deref()));
                 }
                 Passes::Tiles(pass, trees) => {
                     let shown = trees.as_deref().filter(|_| plan.shows_trees());

@@ -116,7 +116,7 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::render`], but for what is only found out while drawing: [`Renderer::finish`] says that.
     pub fn submit(&mut self, eye: &Eye, cascades: &[Cascade], exposure: f64) -> Result<Ticket> {
-        let light = self.light.clone();
+        let light = self.light;
         let sent = self.record(Moment { eye, cascades, light: &light, exposure });
         sent.inspect_err(|_| self.world.forget())
     }

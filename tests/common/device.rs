@@ -122,8 +122,8 @@ pub const WOODS: &str = "[terrain]\nheightmap = \"builtin:ridge\"\n[[species]]\n
     [[camera]]\nname = \"a\"\nposition = [0.0, 0.0, 10.0]\ntarget = [9.0, 9.0, 5.0]\nvertical_fov = 50.0\n";
 
 /// Draws frames from cameras that jump at random, and passes the number of each on to `after`. What lives on the device
-/// must stay what it was after the first: a frame leaves at most its last read-back behind for the next to free, and
-/// lists of quads grow by a per cent.
+/// must stay what it was after the first: a buffer made anew leaves its elder for the next frame to free, and lists of quads,
+/// with what they are uploaded through, grow by a per cent.
 pub fn soak(gpu: &Gpu, scene: &Scene, frames: u32, after: impl FnMut(u32)) {
     soak_in_flight(gpu, scene, (frames, 1), after);
 }
@@ -147,7 +147,7 @@ pub fn soak_in_flight(
             renderer.finish(waiting.pop_front().unwrap()).unwrap();
         }
         let now = gpu.memory_report();
-        if frame as usize + 1 <= in_flight {
+        if (frame as usize) < in_flight {
             first = now;
         } else {
             assert!(now.len() <= first.len() + 2, "frame {frame}: {now:?} where there was {first:?}");

@@ -1,4 +1,4 @@
-//! Nothing grows, and nothing is said: a thousand frames, each from another place.
+//! Nothing grows, and nothing is said: a thousand frames, each from another place, two in flight.
 
 use canopy::gpu::{Gpu, GpuOptions};
 
@@ -24,7 +24,7 @@ fn a_thousand_camera_jumps_leave_memory_flat() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let scene = device::small_scene(device::WOODS);
     let mut found = Vec::new();
-    device::soak(&gpu, &scene, 1000, |frame| {
+    device::soak_in_flight(&gpu, &scene, (1000, 2), |frame| {
         if frame % 10 == 9 {
             found.push(resident());
         }
@@ -40,6 +40,6 @@ fn a_thousand_camera_jumps_leave_memory_flat() {
 #[ignore = "takes minutes"]
 fn a_thousand_camera_jumps_leave_validation_silent() {
     let gpu = device::open();
-    device::soak(&gpu, &device::small_scene(device::WOODS), 1000, |_| ());
+    device::soak_in_flight(&gpu, &device::small_scene(device::WOODS), (1000, 2), |_| ());
     gpu.close().unwrap();
 }
