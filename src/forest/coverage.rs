@@ -38,8 +38,8 @@ const LEAST_DISC: f64 = 1.0 / 16.0;
 const LEAST_RADIUS: f64 = 0.75;
 /// Most workgroups a dispatch.
 const MOST_GROUPS: u32 = 32768;
-/// Texels along a side of a workgroup's block.
-const BLOCK: u32 = 16;
+/// Texels of a workgroup's region.
+const REGION: [u32; 2] = [32, 16];
 
 /// Format of tiles of so many channels.
 pub fn format(channels: u32) -> vk::Format {
@@ -324,7 +324,7 @@ impl CoverageData {
         if work.tiles == 0 {
             return;
         }
-        let blocks = self.tiles.size()[0] / BLOCK;
+        let [across, down] = REGION.map(|n| self.tiles.size()[0] / n);
         recorder.compute("coverage tiles", |pass| {
             let push = |first_tile, first_splat| Push {
                 seeds: seeds.parameters,
@@ -371,7 +371,7 @@ impl CoverageData {
                     ],
                 );
                 pass.push(&push(batch.tiles.0, first));
-                pass.dispatch([blocks, blocks, batch.tiles.1]);
+                pass.dispatch([across, down, batch.tiles.1]);
                 pass.barrier();
             }
         });
