@@ -78,7 +78,7 @@ pub fn run(args: &Args) -> Result<()> {
     };
     let mut table = Table::new(3, &["kind", "name", "reason", "bytes"]);
     for i in &plan.items {
-        let bytes = if i.bytes > 0 { output::bytes(i.bytes) } else { "-".into() };
+        let bytes = if i.bytes() > 0 { output::bytes(i.bytes()) } else { "-".into() };
         table.row([i.kind.into(), i.name.clone(), i.reason.clone(), bytes]);
     }
     table.row(["".into(), "total".into(), "device memory".into(), output::bytes(plan.bytes())]);

@@ -438,8 +438,8 @@ fn text(r: &Report) -> String {
     text += &format!("\n{}", drawn.text());
 
     let mut memory = Table::new(1, &["device memory", ""]);
-    for i in r.plan.items.iter().filter(|i| i.bytes > 0) {
-        memory.row([i.name.clone(), output::bytes(i.bytes)]);
+    for i in r.plan.items.iter().filter(|i| i.bytes() > 0) {
+        memory.row([i.name.clone(), output::bytes(i.bytes())]);
     }
     memory.row(["planned".into(), output::bytes(r.memory.planned_bytes)]);
     memory.row(["allocated".into(), output::bytes(r.memory.allocated_bytes)]);

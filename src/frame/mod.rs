@@ -154,14 +154,16 @@ impl Renderer {
     /// Builds what the plan lists.
     ///
     /// # Errors
-    /// [`crate::Error::Device`] when out of memory.
+    /// [`crate::Error::Usage`] when that is not what its numbers ask for ([`Plan::list`]); [`crate::Error::Device`] when out of
+    /// memory.
     pub fn new(gpu: &Gpu, scene: Arc<Scene>, plan: Plan, baked: &[Baked]) -> Result<Self> {
         let _build = info_span!("build").entered();
+        plan.check_items(&scene)?;
         let terrain = TerrainData::new(gpu, &scene, &plan)?;
         let forest = if plan.range > 0.0 {
             let species = SpeciesData::new(gpu, &scene, &plan, baked)?;
             let tables: Vec<_> = baked.iter().map(|b| b.tables.as_ref()).collect();
-            let tables = TableData::new(gpu, &tables, plan.pair_tables)?;
+            let tables = TableData::new(gpu, plan.tables()?, &tables)?;
             let near = || -> Result<NearTrees> {
                 Ok(NearTrees {
                     cull: CullData::new(gpu, &scene, &plan, &tables)?,

@@ -12,6 +12,7 @@ use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets, shaders, vk,
 };
 use crate::plan::Plan;
+use crate::plan::names::pass;
 use crate::scene::{Scene, Sky};
 
 /// Finds and lights the ground.
@@ -72,7 +73,7 @@ impl SeenGround {
     ) {
         let colors: Vec<_> = targets.quads.iter().map(|q| q.attachment(Some([0.0; 4]), false)).collect();
         let depth = Some(targets.depth.attachment(Some([0.0; 4]), false));
-        recorder.render("terrain", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
+        recorder.render(pass::TERRAIN, &Targets { colors: &colors, depth, layers: 1 }, |pass| {
             pass.bind(
                 &self.mesh,
                 &[
@@ -100,7 +101,7 @@ impl SeenGround {
     ) {
         let Some(quads_seen) = &targets.quads else { return };
         let (tiles, nodes) = self.none.or(forest);
-        recorder.compute("ground", |pass| {
+        recorder.compute(pass::GROUND, |pass| {
             let more = targets.shown();
             let all = [
                 ("view", Resource::Buffer(view)),

@@ -21,10 +21,10 @@ impl Plan {
     pub(super) fn check(&self, budget_mib: u32, device: Option<&DeviceInfo>) -> Result<()> {
         let budget = u64::from(budget_mib) << 20;
         let largest = || {
-            let mut items: Vec<&Item> = self.items.iter().filter(|i| i.bytes > 0).collect();
-            items.sort_by_key(|i| std::cmp::Reverse(i.bytes));
+            let mut items: Vec<&Item> = self.items.iter().filter(|i| i.bytes() > 0).collect();
+            items.sort_by_key(|i| std::cmp::Reverse(i.bytes()));
             let named: Vec<String> =
-                items.iter().take(3).map(|i| format!("{} ({} MiB)", i.name, i.bytes >> 20)).collect();
+                items.iter().take(3).map(|i| format!("{} ({} MiB)", i.name, i.bytes() >> 20)).collect();
             named.join(", ")
         };
         if self.bytes() > budget {

@@ -1,9 +1,10 @@
 //! The ground and its coverage by trees: how many tiles, for a view at the terrain's level of detail.
 
 use super::Plan;
+use super::names::resource;
 use crate::camera::Eye;
-use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
+use crate::gpu::{DeviceInfo, ImageDesc, vk};
 use crate::land::quadtree::{MIN_REFINE, quad_count};
 use crate::scene::Scene;
 
@@ -27,7 +28,7 @@ impl Plan {
         let cells = f64::from(gpu::TERRAIN_CELLS) * f64::from(s.terrain_pixels);
         let refine = (eye.pixels_at_1m / cells).max(MIN_REFINE) / MIN_REFINE;
         let wanted = (COVER_SLOTS * refine * refine).min(f64::from(self.terrain_tiles)) as u64;
-        let room = (u64::from(s.memory_mib) << 20) / 4 / self.cover_tile_bytes();
+        let room = (u64::from(s.memory_mib) << 20) / 4 / self.cover_tiles(1).bytes();
         let layers = device.map_or(2048, |d| d.max_layers) / self.cover_layers();
         let most = wanted.min(quad_count(&scene.terrain, self.plain_side)).min(room).min(layers.into());
         self.cover_slots = most.max(1) as u32;
@@ -38,14 +39,18 @@ impl Plan {
         self.cover_channels.div_ceil(4)
     }
 
-    /// Bytes of a coverage tile with its mip levels.
-    pub(super) fn cover_tile_bytes(&self) -> u64 {
-        u64::from(self.cover_channels) * u64::from(self.coverage_size).pow(2) * 2 * 85 / 64
+    /// Format of coverage tiles.
+    pub fn cover_format(&self) -> vk::Format {
+        if self.cover_channels == 2 { vk::Format::R16G16_SFLOAT } else { vk::Format::R16G16B16A16_SFLOAT }
     }
 
-    /// Bytes of the shader-map's nodes.
-    pub fn node_bytes(&self) -> u64 {
-        let nodes = u64::from(self.terrain_tiles) * u64::from(gpu::FOREST_NODES * gpu::FOREST_NODES);
-        nodes * size_of::<gpu::ForestNode>() as u64
+    /// Coverage tiles, as many as these.
+    pub(super) fn cover_tiles(&self, count: u32) -> ImageDesc<'static> {
+        ImageDesc {
+            layers: count * self.cover_layers(),
+            levels: gpu::COVER_LEVELS,
+            usage: vk::ImageUsageFlags::STORAGE,
+            ..ImageDesc::plain(resource::COVERAGE, self.cover_format(), [self.coverage_size; 2])
+        }
     }
 }

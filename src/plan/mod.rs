@@ -3,10 +3,13 @@
 
 mod check;
 mod cover;
+mod data;
 mod items;
+pub mod names;
 mod passes;
 mod range;
 mod seeds;
+mod targets;
 mod tiles;
 
 use crate::Result;
@@ -16,6 +19,7 @@ use crate::gpu::interface as gpu;
 use crate::land::pattern::Pattern;
 use crate::scene::{Camera, Scene};
 
+pub use data::{NODE_TEXELS, QUAD_INDEX_BYTES, tables};
 pub use items::Item;
 pub use tiles::{Drawing, Rasterizer, TILE_STEPS, TileBuffer, TileBuffers};
 
@@ -288,11 +292,6 @@ impl Plan {
             cover_channels: 0,
             pattern: None,
         }
-    }
-
-    /// Device memory of the whole plan, bytes.
-    pub fn bytes(&self) -> u64 {
-        self.items.iter().map(|i| i.bytes).sum()
     }
 
     /// Whether the picture shows trees that are drawn one by one: in a view mode of the ground they would hide it.

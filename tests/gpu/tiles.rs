@@ -117,7 +117,9 @@ fn long_lists_are_gone_through_to_the_end_and_without_lists_all_trees_are() {
         draw(&gpu, &scene, plan(&gpu, &scene, size, true, far(Rasterizer::Graphics))).unwrap();
     agree(&graphics, &tiles, "lists of several parts");
     for tile_steps in [0, report.trees.camera] {
-        let (_, whole) = draw(&gpu, &scene, Plan { tile_steps, ..tiled.clone() }).unwrap();
+        let mut short = Plan { tile_steps, ..tiled.clone() };
+        short.list(&scene);
+        let (_, whole) = draw(&gpu, &scene, short).unwrap();
         assert!(whole == tiles, "with room for {tile_steps} steps other bits are drawn");
     }
     gpu.close().unwrap();

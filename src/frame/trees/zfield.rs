@@ -8,6 +8,7 @@ use crate::gpu::interface::{CAMERA_DRAWS, DrawCommand};
 use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, Program, Recorder, Resource, Sampler, Targets, shaders,
 };
+use crate::plan::names::pass;
 use crate::plan::{Plan, ViewMode};
 use crate::scene::Scene;
 
@@ -25,7 +26,7 @@ impl Trees {
     /// [`crate::Error::Device`] if the device fails.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, mask_rows: u32) -> Result<Self> {
         let s = &scene.settings;
-        let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
+        let formats = plan.color_formats();
         let before = s.view_iterations - 1;
         let program = |estimates: u32, magnified: bool, converged: bool| {
             let mut constants = vec![
@@ -79,7 +80,7 @@ impl Trees {
     ) {
         let colors: Vec<_> = targets.colors.iter().map(|t| t.attachment(None, true)).collect();
         let depth = Some(targets.depth.attachment(None, true));
-        recorder.render("trees", &Targets { colors: &colors, depth, layers: 1 }, |pass| {
+        recorder.render(pass::TREES, &Targets { colors: &colors, depth, layers: 1 }, |pass| {
             if forest.seeds.visible == 0 {
                 return;
             }
