@@ -69,7 +69,7 @@ impl Ground {
             let mut constants = vec![
                 ("COVER_CHANNELS", plan.cover_channels),
                 ("COVER_SIDE", plan.coverage_size),
-                ("HAS_SUN", u32::from(plan.cascades > 0)),
+                ("HAS_SUN", u32::from(plan.sun)),
                 ("SHADOWED", u32::from(shadowed)),
             ];
             if plan.view_mode != ViewMode::Radiance {

@@ -160,7 +160,7 @@ impl Renderer {
         let _build = info_span!("build").entered();
         plan.check_items(&scene)?;
         let terrain = TerrainData::new(gpu, &scene, &plan)?;
-        let forest = if plan.range > 0.0 {
+        let forest = if plan.forest {
             let species = SpeciesData::new(gpu, &scene, &plan, baked)?;
             let tables: Vec<_> = baked.iter().map(|b| b.tables.as_ref()).collect();
             let tables = TableData::new(gpu, plan.tables()?, &tables)?;
@@ -235,7 +235,7 @@ impl Renderer {
     /// # Errors
     /// [`Error::Usage`] when it shines and the plan was made without.
     pub fn set_sun(&mut self, sun: Sun) -> Result<()> {
-        if self.plan.cascades == 0 && sun.shines() {
+        if !self.plan.sun && sun.shines() {
             return Err(Error::Usage("the plan was made without a sun: plan again for this one".into()));
         }
         Arc::make_mut(&mut self.scene).sun = sun;
@@ -289,6 +289,13 @@ impl Renderer {
                 "trees are within {:.0} m of this camera, and the plan was made where none are, so it draws none by itself: plan \
                  again for this camera",
                 plan.last_range()
+            )));
+        }
+        if !plan.trees_within(extent, heights, eye.position) {
+            return Err(Error::Usage(format!(
+                "trees are farther than {:.0} m from this camera, and the plan was made where none is, so it does not draw them: plan \
+                 again for this camera",
+                plan.range
             )));
         }
         // Stream: which quads, where in the caches, what is new.

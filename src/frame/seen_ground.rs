@@ -52,7 +52,7 @@ impl SeenGround {
                     ("SAMPLES", plan.samples),
                     ("TREES", u32::from(plan.shows_trees())),
                     ("SKY_IMAGE", u32::from(matches!(scene.sky, Sky::LatLong { .. }))),
-                    ("HAS_SUN", u32::from(plan.cascades > 0)),
+                    ("HAS_SUN", u32::from(plan.sun)),
                     ("SHADOWED", u32::from(plan.cascades > 0)),
                     ("VIEW_MODE", plan.view_mode as u32),
                 ],

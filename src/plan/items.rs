@@ -88,14 +88,14 @@ impl Plan {
         if self.z_fields {
             self.list_views(scene, &mut items);
         }
-        if self.range > 0.0 {
+        if self.forest {
             self.list_tables(scene, &mut items);
             self.list_distribution(scene, &mut items);
         }
         if self.z_fields {
             self.list_seeds(&mut items);
         }
-        if self.range > 0.0 {
+        if self.forest {
             self.list_forest(scene, &mut items);
         }
         self.list_targets(scene, &mut items);

@@ -16,6 +16,7 @@ use crate::Result;
 use crate::camera::Eye;
 use crate::gpu::DeviceInfo;
 use crate::gpu::interface as gpu;
+use crate::ladder::Ladder;
 use crate::land::pattern::Pattern;
 use crate::scene::{Camera, Scene};
 
@@ -25,44 +26,6 @@ pub use tiles::{Drawing, Rasterizer, TILE_STEPS, TileBuffer, TileBuffers};
 
 /// Storage buffers that every Vulkan device binds, when no device is known.
 const ASSUMED_STORAGE: u64 = 128 << 20;
-
-/// How trees are drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Representation {
-    /// z-fields near, the shader-map far, blended between (BN12, section 7).
-    #[default]
-    Auto,
-    /// z-fields at any distance.
-    #[serde(rename = "zfield")]
-    ZField,
-    /// The shader-map at any distance.
-    ShaderMap,
-}
-
-impl Representation {
-    /// All, with the names that users write.
-    pub const NAMES: [(&'static str, Representation); 3] = [
-        ("auto", Representation::Auto),
-        ("zfield", Representation::ZField),
-        ("shader-map", Representation::ShaderMap),
-    ];
-
-    /// The name that users write.
-    pub fn name(self) -> &'static str {
-        Self::NAMES.iter().find(|(_, r)| *r == self).map_or("", |(n, _)| n)
-    }
-
-    /// Distance to which a species is drawn tree by tree, m, from that of [`Representation::Auto`].
-    fn range(self, auto: f64) -> f64 {
-        match self {
-            Representation::Auto => auto,
-            // Finite, so that its square is so in single precision.
-            Representation::ZField => 1e15,
-            Representation::ShaderMap => 1e-3,
-        }
-    }
-}
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -100,8 +63,8 @@ impl ViewMode {
 pub struct Plan {
     /// Everything, in the order of building.
     pub items: Vec<Item>,
-    /// How trees are drawn.
-    pub representation: Representation,
+    /// What stands for a tree, near to far, with the apparent heights between the rungs.
+    pub ladder: Ladder,
     /// What the picture shows; [`Plan::new`] says radiance, and whoever wants another mode sets it before the renderer is made.
     pub view_mode: ViewMode,
     /// What finds the samples of trees.
@@ -115,6 +78,10 @@ pub struct Plan {
     pub samples: u32,
     /// Layers of the image apart: sun, sky, coverage, species.
     pub layers: bool,
+    /// Whether a sun shines.
+    pub sun: bool,
+    /// Whether any tree stands in the scene.
+    pub forest: bool,
     /// Whether trees are drawn one by one: any can come within the range of an eye. Without, the shader-map shows all.
     pub z_fields: bool,
     /// Whether light meets the average light that the pair tables hold (BN12, G and T): that of a sun, and where it
@@ -122,14 +89,16 @@ pub struct Plan {
     pub pair_tables: bool,
     /// Bands of light transfer: how well texels of trees that are drawn one by one know from where the sun reaches them.
     pub transfer_bands: u32,
-    /// Shadow cascades; 0 without sun.
+    /// Shadow cascades; 0 without sun, and where average light, which includes its shadows, is all that there is.
     pub cascades: u32,
     /// Distance that the cascades reach, m.
     pub shadow_distance: f64,
     /// Distance to which each species is drawn tree by tree (s_max of BN12), m.
     pub species_range: Vec<f64>,
-    /// The largest of these, m; 0 without trees.
+    /// The largest of these, m; 0 where no tree is drawn by itself.
     pub range: f64,
+    /// Part of the range from which on light and shadow are the average's; 0: they never are.
+    pub convergence: f64,
     /// Range of trees on silhouettes of the ground over that of others (1: no such trees).
     #[serde(rename = "silhouette_reach")]
     pub silhouette_ratio: f64,
@@ -220,17 +189,18 @@ impl Plan {
         device: Option<&DeviceInfo>,
     ) -> Result<Self> {
         let drawing = drawing.into();
-        let mut plan = Plan::empty(scene, eye, layers, drawing.representation, device);
+        let ladder = drawing.ladder.unwrap_or(scene.ladder).resolved(&scene.settings);
+        let mut plan = Plan::empty(scene, eye, layers, ladder, device);
         plan.check_species(scene)?;
-        plan.ranges(scene, eye);
-        if plan.range > 0.0 {
+        plan.ranges(scene, eye, places);
+        plan.shadows(scene, eye);
+        if plan.forest {
             plan.seeds(scene, eye, device);
             plan.coverage(scene, eye, device);
-            // At a range without end the average has no share, at any distance.
-            plan.pair_tables = plan.cascades > 0 && drawing.representation != Representation::ZField;
+            plan.pair_tables = plan.sun && ladder.averages();
             plan.z_fields =
                 std::iter::once(&eye.position).chain(places).any(|p| plan.scene_in_range(scene, *p));
-            if plan.z_fields && plan.cascades > 0 {
+            if plan.z_fields && plan.sun {
                 plan.transfer_bands = scene.settings.transfer_bands;
             }
             if !plan.z_fields {
@@ -238,7 +208,6 @@ impl Plan {
                 (plan.tree_capacity, plan.caster_capacity) = (0, 0);
             }
         }
-        plan.shadows(scene, eye);
         plan.choose_rasterizer(drawing.rasterizer, device)?;
         plan.list(scene);
         plan.check(scene.settings.memory_mib, device)?;
@@ -246,24 +215,20 @@ impl Plan {
     }
 
     /// A plan of a scene without trees, before anything is worked out.
-    fn empty(
-        scene: &Scene,
-        eye: &Eye,
-        layers: bool,
-        representation: Representation,
-        device: Option<&DeviceInfo>,
-    ) -> Self {
+    fn empty(scene: &Scene, eye: &Eye, layers: bool, ladder: Ladder, device: Option<&DeviceInfo>) -> Self {
         let s = &scene.settings;
         let terrain_tiles = if scene.terrain.heights.is_some() { 1024 } else { 1 };
         Plan {
             items: Vec::new(),
-            representation,
+            ladder,
             view_mode: ViewMode::Radiance,
             rasterizer: Rasterizer::Graphics,
             tile_steps: TILE_STEPS,
             size: eye.size,
             samples: check::samples(s.samples, device),
             layers,
+            sun: scene.sun.shines(),
+            forest: false,
             z_fields: false,
             pair_tables: false,
             transfer_bands: 0,
@@ -271,6 +236,7 @@ impl Plan {
             shadow_distance: 0.0,
             species_range: Vec::new(),
             range: 0.0,
+            convergence: 0.0,
             silhouette_ratio: 1.0,
             draw_limits: [0.0; 3],
             tallest: 0.0,

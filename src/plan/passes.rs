@@ -25,7 +25,7 @@ impl Plan {
         if self.z_fields {
             let pipelines = if tiles { &tiles::TREE_PIPELINES[..] } else { &TREE_PIPELINES };
             pipelines.iter().for_each(|(name, reason)| add(name, reason));
-            if self.cascades > 0 {
+            if self.sun {
                 let iterations = scene.settings.light_iterations;
                 let reason = format!("the sun is up: {iterations} iterations to where its light enters");
                 add(pipeline::LIGHT_RAY, &reason);
@@ -36,7 +36,7 @@ impl Plan {
     /// Passes, in the order of drawing.
     pub(super) fn list_passes(&self, scene: &Scene, items: &mut Items) {
         let mut add = |name: &str, reason: &str| items.step("pass", name, reason);
-        let trees = self.range > 0.0;
+        let trees = self.forest;
         if scene.terrain.heights.is_some() {
             add(pass::TERRAIN_TILES, "new quads of terrain");
         }

@@ -1,9 +1,10 @@
 //! What finds the samples of trees, and what compute tiles take for that.
 
+use super::Plan;
 use super::names::{pass, pipeline};
-use super::{Plan, Representation};
 use crate::gpu::interface::{BIN_LANES, DEPTH_BINS, ORDER_LANES, SIGHT_TEXELS, TileState};
 use crate::gpu::{BufferDesc, DeviceInfo, vk};
+use crate::ladder::Ladder;
 use crate::{Error, Result};
 
 /// Steps of writing the lists (trees, and entries): an invocation takes 1/64 of them, and drivers end loops after 65,535 turns.
@@ -52,23 +53,23 @@ impl Rasterizer {
 }
 
 /// How a picture's trees are drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Drawing {
-    /// What stands for a tree.
-    pub representation: Representation,
+    /// What stands for a tree, near to far; `None`: what the scene says.
+    pub ladder: Option<Ladder>,
     /// What finds its samples; `None`: what suits the device (see [`Rasterizer::NAMES`]).
     pub rasterizer: Option<Rasterizer>,
 }
 
-impl From<Representation> for Drawing {
-    fn from(representation: Representation) -> Self {
-        Drawing { representation, rasterizer: None }
+impl From<Ladder> for Drawing {
+    fn from(ladder: Ladder) -> Self {
+        Drawing { ladder: Some(ladder), rasterizer: None }
     }
 }
 
 impl From<Rasterizer> for Drawing {
     fn from(rasterizer: Rasterizer) -> Self {
-        Drawing { representation: Representation::default(), rasterizer: Some(rasterizer) }
+        Drawing { ladder: None, rasterizer: Some(rasterizer) }
     }
 }
 

@@ -9,9 +9,10 @@ use canopy::camera::Eye;
 use canopy::frame::Renderer;
 use canopy::gpu::{Description, Gpu};
 use canopy::image::{Linear, Picture};
+use canopy::ladder::Ladder;
 use canopy::physics::raster::Raster;
 use canopy::plan::names::{pass, pipeline, resource};
-use canopy::plan::{Drawing, Plan, Rasterizer, Representation, TileBuffers};
+use canopy::plan::{Drawing, Plan, Rasterizer, TileBuffers};
 use canopy::scene::{Camera, Distribution, Scene};
 
 const SIZE: [u32; 2] = [64, 48];
@@ -460,7 +461,7 @@ fn without_sunlight(gpu: &Gpu, mut scene: Scene, rasterizer: Rasterizer) {
 fn level_ground_is_one_tile_without_slopes() {
     let gpu = device::open();
     let mut scene = scene();
-    let plan = planned(&gpu, &scene, Representation::Auto);
+    let plan = planned(&gpu, &scene, Ladder::AUTO);
     assert!(plan.terrain_tiles > 1 && plan.height_tiles == 1);
     let (level, reduced) = drawn(&gpu, &scene, plan.clone());
     assert!(!level.draws(pass::TERRAIN_TILES) && !level.has("height map"));
@@ -541,24 +542,98 @@ fn a_chosen_representation_needs_nothing_of_the_other() {
 fn one_representation(rasterizer: Rasterizer) {
     let gpu = device::open();
     let scene = scene();
-    let how = |representation| Drawing { representation, rasterizer: Some(rasterizer) };
+    let how = |ladder| Drawing { ladder: Some(ladder), rasterizer: Some(rasterizer) };
     let shown = tree_drawing(rasterizer).0[0];
-    let auto = planned(&gpu, &scene, how(Representation::Auto));
+    let auto = planned(&gpu, &scene, how(Ladder::AUTO));
     assert!(auto.z_fields && auto.pair_tables);
+    assert!(!auto.ladder.to_string().is_empty() && auto.convergence > 0.0 && auto.cascades > 0);
     // Trees at any distance never converge to an average.
-    let plan = planned(&gpu, &scene, how(Representation::ZField));
+    let plan = planned(&gpu, &scene, how(Ladder::ZFIELD));
     let (trees, reduced) = drawn(&gpu, &scene, plan.clone());
     assert!(
         trees.draws(shown) && !trees.has("pair tables of a") && trees.bytes(resource::PAIR_TABLES) <= 1024
     );
     assert!(reduced == picture(&gpu, &scene, Plan { pair_tables: true, ..plan }));
     // No tree stands by itself where the shader-map shows all.
-    let plan = planned(&gpu, &scene, how(Representation::ShaderMap));
+    let plan = planned(&gpu, &scene, how(Ladder::SHADER_MAP));
     let (map, reduced) = drawn(&gpu, &scene, plan.clone());
     assert!(map.has("pair tables of a") && !map.has("seeds") && !map.draws(shown));
+    // Average light includes its shadows.
+    assert!(plan.sun && !map.draws(pass::SHADOWS) && map.bytes(resource::CASCADES) < 1 << 16);
+    let Plan { cascades, shadow_distance, .. } = auto;
+    assert!(reduced == picture(&gpu, &scene, Plan { cascades, shadow_distance, ..plan.clone() }));
     let Plan { seed_regions, tree_capacity, shadow_quads, caster_capacity, .. } = auto;
     let near = Plan { z_fields: true, seed_regions, tree_capacity, shadow_quads, caster_capacity, ..plan };
     assert!(reduced == picture(&gpu, &scene, near));
+    // Where no tree is near enough to be drawn by itself, it is what the usual ladder shows.
+    let mut far = scene.clone();
+    far.cameras[0].position = [150.0, -9000.0, 5000.0];
+    far.cameras[0].vertical_fov = 3.0;
+    far.settings.set("zfield_min_pixels", 3.0).unwrap();
+    let [auto, map] = [Ladder::AUTO, Ladder::SHADER_MAP].map(|l| planned(&gpu, &far, how(l)));
+    assert!(!auto.z_fields && !map.z_fields);
+    assert!(picture(&gpu, &far, auto) == picture(&gpu, &far, map));
+    gpu.close().unwrap();
+}
+
+/// The distance that a plan draws trees to is what its ladder needs, and no number that stands for none or for all.
+#[test]
+fn a_ladder_says_how_far_trees_are_drawn_one_by_one() {
+    let mut scene = scene();
+    hills(&mut scene);
+    let plan = |scene: &Scene, how: Drawing| {
+        let eye = Eye::new(&scene.cameras[0], &scene.terrain, SIZE);
+        Plan::for_eye(scene, &eye, false, how, None).unwrap()
+    };
+    let of = |text: &str| plan(&scene, text.parse::<Ladder>().unwrap().into());
+    let (eight, four) = (of("zfield:8,shader-map"), of("zfield:4,shader-map"));
+    assert!(four.range == 2.0 * eight.range && four.silhouette_ratio == 0.5 * eight.silhouette_ratio);
+    assert_eq!(four.last_range(), eight.last_range(), "silhouettes have a knob of their own");
+    // A scene's own ladder is as one that is asked for, and the knob is where neither says.
+    scene.ladder = "zfield:8,shader-map".parse().unwrap();
+    assert_eq!(plan(&scene, Drawing::default()).items, eight.items);
+    scene.settings.set("zfield_min_pixels", 8.0).unwrap();
+    assert_eq!(plan(&scene, Ladder::AUTO.into()).ladder, eight.ladder);
+
+    let alone = plan(&scene, Ladder::ZFIELD.into());
+    let diagonal = scene.terrain.extent[0].hypot(scene.terrain.extent[1]);
+    assert!(alone.range > diagonal && alone.range < 2.0 * diagonal, "{}", alone.range);
+    assert!(alone.convergence == 0.0 && !alone.pair_tables && alone.silhouette_ratio == 1.0);
+    assert!(alone.draw_limits.is_sorted() && alone.draw_limits[2] >= alone.range, "{:?}", alone.draw_limits);
+    assert!(alone.shadow_distance > diagonal && alone.cascades > 0);
+    // From farther away, farther.
+    let far = scene.cameras[0].position.map(|p| p - 2000.0);
+    let eye = Eye::new(&scene.cameras[0], &scene.terrain, SIZE);
+    let both = Plan::for_path(&scene, &eye, &[far], false, Ladder::ZFIELD, None).unwrap();
+    assert!(both.range > 3000.0 && both.range < 6000.0, "{}", both.range);
+
+    let map = plan(&scene, Ladder::SHADER_MAP.into());
+    assert!(
+        map.convergence > 0.0
+            && map.range == 0.0
+            && map.species_range == [0.0]
+            && map.forest
+            && !map.z_fields
+    );
+    assert!(map.sun && map.pair_tables && map.cascades == 0);
+    // Bare ground between far trees is in the shadow of hills as far as the user says.
+    scene.settings.set("shadow_distance", 500.0).unwrap();
+    let shaded = plan(&scene, Ladder::SHADER_MAP.into());
+    assert!(shaded.cascades > 0 && shaded.shadow_distance == 500.0);
+}
+
+#[test]
+fn z_fields_alone_are_planned_again_for_a_camera_that_is_farther_away() {
+    let gpu = device::open();
+    let scene = scene();
+    let plan = planned(&gpu, &scene, Ladder::ZFIELD);
+    let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), plan, &device::bake(&scene)).unwrap();
+    let near = &scene.cameras[0];
+    let away = Camera { position: [150.0, -3000.0, 900.0], ..near.clone() };
+    let refused = renderer.render(&away, 1.0).unwrap_err();
+    assert!(matches!(&refused, Error::Usage(text) if text.contains("plan again")), "{refused}");
+    assert!(renderer.render(near, 1.0).unwrap().trees.camera > 100);
+    drop(renderer);
     gpu.close().unwrap();
 }
 
@@ -566,7 +641,7 @@ fn one_representation(rasterizer: Rasterizer) {
 fn one_species_has_one_density() {
     let gpu = device::open();
     let mut scene = scene();
-    let plan = planned(&gpu, &scene, Representation::Auto);
+    let plan = planned(&gpu, &scene, Ladder::AUTO);
     assert_eq!((plan.cover_channels, plan.cover_layers()), (2, 1));
     let (two, reduced) = drawn(&gpu, &scene, plan.clone());
     let mut four = Plan { cover_channels: 4, ..plan };
@@ -579,7 +654,7 @@ fn one_species_has_one_density() {
     let one = scene.species[0].clone();
     for (count, layers) in [(3, 1), (4, 2), (8, 3)] {
         scene.species = vec![one.clone(); count];
-        let plan = planned(&gpu, &scene, Representation::Auto);
+        let plan = planned(&gpu, &scene, Ladder::AUTO);
         assert_eq!((plan.cover_channels, plan.cover_layers()), (4 * layers, layers), "{count} species");
     }
     gpu.close().unwrap();

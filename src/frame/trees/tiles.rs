@@ -114,8 +114,8 @@ impl TreeTiles {
                     ("SAMPLES", plan.samples),
                     ("ESTIMATES", before),
                     // Without sun no ray goes to it.
-                    ("LIGHT_ITERATIONS", if plan.cascades > 0 { s.light_iterations } else { 0 }),
-                    ("HAS_SUN", u32::from(plan.cascades > 0)),
+                    ("LIGHT_ITERATIONS", if plan.sun { s.light_iterations } else { 0 }),
+                    ("HAS_SUN", u32::from(plan.sun)),
                     ("TRANSFER_BANDS", plan.transfer_bands),
                     ("VIEW_MODE", plan.view_mode as u32),
                 ],

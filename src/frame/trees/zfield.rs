@@ -36,8 +36,8 @@ impl Trees {
                 ("SAMPLES", plan.samples),
                 ("ESTIMATES", estimates),
                 // Without sun no ray goes to it.
-                ("LIGHT_ITERATIONS", if plan.cascades > 0 { s.light_iterations } else { 0 }),
-                ("HAS_SUN", u32::from(plan.cascades > 0)),
+                ("LIGHT_ITERATIONS", if plan.sun { s.light_iterations } else { 0 }),
+                ("HAS_SUN", u32::from(plan.sun)),
                 ("MAGNIFIED", u32::from(magnified)),
                 ("CONVERGED", u32::from(converged)),
                 ("TRANSFER_BANDS", plan.transfer_bands),
