@@ -29,11 +29,6 @@ pub fn converged(relative: f64, end: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Distance over the range; where there is none, everything is handed over, as at its end.
-pub fn relative_distance(distance: f64, range: f64) -> f64 {
-    if range > 0.0 { distance / range } else { 1.0 }
-}
-
 /// s/s_max from which on the shader-map shows trees: where the first one begins to fade.
 pub const HANDOVER_FROM: f64 = 0.8;
 /// 1 over the width of the band in which all of them fade.
@@ -82,6 +77,12 @@ mod tests {
         }
         // Alone, a tree fades within a tenth of the range.
         assert_eq!((tree_fade(0.85, 0.5), tree_fade(0.951, 0.5)), (1.0, 0.0));
+    }
+
+    #[test]
+    fn light_that_never_converges_does_so_at_no_distance() {
+        assert!([0.0, 0.5, 1.0, 1e9].iter().all(|relative| converged(*relative, 0.0) == 0.0));
+        assert_eq!([0.0, 0.45, 1.0].map(|relative| converged(relative, 0.45)), [0.0, 1.0, 1.0]);
     }
 
     #[test]

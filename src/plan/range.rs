@@ -66,12 +66,8 @@ impl Plan {
 
     /// The farthest that a tree of the terrain may be from any of these places, m, or from any on the terrain.
     fn farthest<'a>(&self, scene: &Scene, places: impl Iterator<Item = &'a [f64; 3]>) -> f64 {
-        let [low, high] = self.trees_box(scene.terrain.extent, ground_range(scene));
-        let from = |place: &[f64; 3]| {
-            let axes = [0, 1, 2].map(|k| (place[k] - low[k]).abs().max((place[k] - high[k]).abs()));
-            axes[0].hypot(axes[1]).hypot(axes[2])
-        };
-        places.map(from).fold(from(&low).max(from(&high)), f64::max)
+        let trees = self.trees_box(scene.terrain.extent, ground_range(scene));
+        places.copied().chain(trees).map(|place| farthest_in(trees, place)).fold(0.0, f64::max)
     }
 
     /// The box of all trees on ground of this extent between two heights.
@@ -95,11 +91,7 @@ impl Plan {
     /// Whether trees of a ladder that hands over to no average are all drawn, on ground of this extent between two heights, as seen
     /// from a place: whether none of them has begun to fade.
     pub fn trees_within(&self, extent: [f64; 2], ground: [f64; 2], place: [f64; 3]) -> bool {
-        let far = [0, 1, 2].map(|k| {
-            let [low, high] = self.trees_box(extent, ground).map(|corner| corner[k]);
-            (place[k] - low).abs().max((place[k] - high).abs())
-        });
-        let farthest = far[0].hypot(far[1]).hypot(far[2]);
+        let farthest = farthest_in(self.trees_box(extent, ground), place);
         !self.forest || self.ladder.averages() || farthest <= self.ladder.opaque_to(self.range)
     }
 
@@ -111,6 +103,12 @@ impl Plan {
         self.trees_in_range(terrain.extent, [terrain.height_at(x, y); 2], place)
             || terrain.heights.is_some() && self.trees_in_range(terrain.extent, ground_range(scene), place)
     }
+}
+
+/// The farthest that a point of a box is from a place, m.
+fn farthest_in([low, high]: [[f64; 3]; 2], place: [f64; 3]) -> f64 {
+    let axes = [0, 1, 2].map(|k| (place[k] - low[k]).abs().max((place[k] - high[k]).abs()));
+    axes[0].hypot(axes[1]).hypot(axes[2])
 }
 
 /// Trees per m² of all species together, at most.
