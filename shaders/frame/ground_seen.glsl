@@ -3,6 +3,7 @@
 #include "frame/ground.glsl"
 #include "frame/camera.glsl"
 #include "frame/samples.glsl"
+#include "frame/tile.glsl"
 #include "frame/forest_node.glsl"
 #include "frame/view_mode.glsl"
 #include "frame/ground_mode.glsl"
@@ -128,7 +129,7 @@ Shown ground_at(ivec2 pixel, uint seen, vec2 size) {
 }
 
 void main() {
-    uvec2 size = picture_size(), corner = gl_WorkGroupID.xy * TILE_SIDE;
+    uvec2 size = picture_size(), corner = tile_corner();
     uint column = gl_LocalInvocationIndex;
     list_pixels(corner, column, size);
     barrier();

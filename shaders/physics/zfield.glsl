@@ -4,6 +4,13 @@
 // point to m_i = (u - 1/2, v - 1/2, depth), linearly, so that m_i(p + s d) = m_i(p) + s m_i(d): callers pass these two.
 // Texels are (nearest depth, farthest depth, occlusion) times opacity, opacity; depths stored as (d + sqrt 2) / (2 sqrt 2).
 
+// The texel of a view that holds a point; of points outside the view the nearest.
+vec4 view_texel(sampler2DArray views, vec2 at, float layer, int level) {
+    // Not textureSize(views, level): llvmpipe takes one invocation's level for all.
+    ivec2 last = max(textureSize(views, 0).xy >> level, 1) - 1;
+    return texelFetch(views, ivec3(clamp(ivec2(floor(at * vec2(last + 1))), ivec2(0), last), int(layer)), level);
+}
+
 // How a view is sampled between its texels.
 #ifndef VIEW_SAMPLE
 #define VIEW_SAMPLE(views, at, layer, mip) textureLod(views, vec3(at, layer), mip)
@@ -32,11 +39,8 @@ float zfield_estimate(sampler2DArray views, vec3 p[3], vec3 d[3], vec3 inverse_d
                       float s, bool farthest) {
     float sum_s = 0.0, opacity = 0.0;
     int level = min(int(mip), textureQueryLevels(views) - 1);
-    // Not textureSize(views, level): llvmpipe takes one invocation's level for all.
-    ivec2 last = max(textureSize(views, 0).xy >> level, 1) - 1;
     for (int i = 0; i < 3; i++) {
-        ivec2 at = ivec2(floor((p[i].xy + s * d[i].xy + 0.5) * vec2(last + 1)));
-        vec4 t = texelFetch(views, ivec3(clamp(at, ivec2(0), last), int(layers[i])), level);
+        vec4 t = view_texel(views, p[i].xy + s * d[i].xy + 0.5, layers[i], level);
         float z = (farthest ? t.g : t.r) * (2.0 * SQRT2) - SQRT2 * t.a;
         sum_s += weights[i] * (z - t.a * p[i].z) * inverse_depth[i];
         opacity += weights[i] * t.a;

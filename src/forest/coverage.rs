@@ -39,8 +39,8 @@ const LEAST_DISC: f64 = 1.0 / 16.0;
 const LEAST_RADIUS: f64 = 0.75;
 /// Most workgroups a dispatch.
 const MOST_GROUPS: u32 = 32768;
-/// Texels along a side of a workgroup's block.
-const BLOCK: u32 = 16;
+/// Texels of a workgroup's region.
+const REGION: [u32; 2] = [32, 16];
 
 /// Both push constants of the production.
 #[repr(C)]
@@ -307,7 +307,7 @@ impl CoverageData {
         if work.tiles == 0 {
             return;
         }
-        let blocks = self.tiles.size()[0] / BLOCK;
+        let [across, down] = REGION.map(|n| self.tiles.size()[0] / n);
         recorder.compute(pass::COVERAGE, |pass| {
             let push = |first_tile, first_splat| Push {
                 seeds: seeds.parameters,
@@ -354,7 +354,7 @@ impl CoverageData {
                     ],
                 );
                 pass.push(&push(batch.tiles.0, first));
-                pass.dispatch([blocks, blocks, batch.tiles.1]);
+                pass.dispatch([across, down, batch.tiles.1]);
                 pass.barrier();
             }
         });

@@ -118,7 +118,7 @@ impl SeenGround {
             ];
             pass.bind(&self.light, &[&all[..], &more].concat());
             pass.push(&terrain.parameters(draws.camera.0));
-            pass.dispatch([self.tiles[0], self.tiles[1], 1]);
+            pass.dispatch([self.tiles[1], self.tiles[0], 1]);
         });
     }
 }

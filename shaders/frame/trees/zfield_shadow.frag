@@ -1,9 +1,12 @@
 // Back depth of one tree as the sun sees it (BN12, section 5): the back, so that no tree shadows its own lit side. A texel
 // holds one tree, and the opacity of others behind it would be lost, more of it the coarser the map. So opacity is the
 // probability of being there: behind several trees the expected light is then the product of what each lets through.
+// Texels of the view are about as large as the map's, and each of those holds one depth: the nearest one of the view is as good as
+// a mean of four, and costs a driver that filters in software a quarter.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "physics/hash.glsl"
+#define VIEW_SAMPLE(views, at, layer, mip) (at == clamp(at, 0.0, 1.0) ? view_texel(views, at, layer, int(mip)) : vec4(0.0))
 #include "physics/zfield.glsl"
 
 layout(location = 0) in vec3 light_p[3];

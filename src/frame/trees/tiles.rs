@@ -212,7 +212,7 @@ impl TreeTiles {
             );
             pass.bind(&self.see, &found);
             pass.push(p);
-            pass.dispatch([across, down, 1]);
+            pass.dispatch([down, across, 1]);
         });
     }
 
@@ -239,7 +239,7 @@ impl TreeTiles {
             ];
             pass.bind(&self.shade, &[&all[..], &forest.species.lit(), &shown].concat());
             pass.push(&self.parameters);
-            pass.dispatch([across, down, 1]);
+            pass.dispatch([down, across, 1]);
         });
     }
 

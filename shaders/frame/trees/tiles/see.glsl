@@ -10,6 +10,7 @@
 #include "frame/trees/tiles/order.glsl"
 #include "frame/trees/tiles/sight.glsl"
 #include "frame/samples.glsl"
+#include "frame/tile.glsl"
 
 const uint PART = 1024u;       // trees of a part of a list
 const uint WORDS = PART / 32u; // of bits a pixel
@@ -131,7 +132,7 @@ uint find_next(inout Next next, float farthest, bool whole, uint begin, uint wor
 }
 
 void main() {
-    uvec2 corner = gl_WorkGroupID.xy * TILE_SIDE;
+    uvec2 corner = tile_corner();
     uint column = gl_LocalInvocationIndex, turns = 0u;
     uvec2 list_at = corner >> p.list_shift;
     uint list = list_at.y * p.lists_across + list_at.x;

@@ -15,6 +15,7 @@
 #include "frame/trees/zfield_mode.glsl"
 #include "frame/shown.glsl"
 #include "frame/column_items.glsl"
+#include "frame/tile.glsl"
 
 layout(local_size_x = 8) in;
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
@@ -146,7 +147,7 @@ shared float depths[8u * MOST_ITEMS];
 #endif
 
 void main() {
-    uvec2 corner = gl_WorkGroupID.xy * TILE_SIDE;
+    uvec2 corner = tile_corner();
     uint column = gl_LocalInvocationIndex;
     list_items(corner, column);
     barrier();
