@@ -5,7 +5,8 @@ use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use canopy::bake::{BakeSettings, ForestSettings, bake_species, load_or_bake, load_or_measure};
+use canopy::bake::tables::measure_species;
+use canopy::bake::{BakeSettings, ForestSettings, Source, bake_species};
 use canopy::camera::Eye;
 use canopy::land::pattern::Pattern;
 use canopy::land::quadtree::{MIN_REFINE, Quadtree};
@@ -85,7 +86,8 @@ fn baking(c: &mut Criterion) {
         b.iter(|| bake_species(&mesh, &optics, &settings, true).unwrap())
     });
     let cache = tempfile::tempdir().unwrap();
-    let cached = || load_or_bake(&mesh, &optics, &settings, Some(cache.path()), true).unwrap();
+    let cached =
+        || Source::new(&mesh, &optics, &settings, Some(cache.path()), true).unwrap().load_views().unwrap();
     let (species, _) = cached();
     group.bench_function("birch from the cache", |b| b.iter(cached));
     let mut knobs = Settings::preset("fast").unwrap();
@@ -94,7 +96,7 @@ fn baking(c: &mut Criterion) {
     knobs.table_rays = 64;
     let forest = ForestSettings::new(&knobs, 0.03, [0.8, 1.2], false);
     group.bench_function("tables of far birches", |b| {
-        b.iter(|| load_or_measure(&species, &forest, None, true).unwrap())
+        b.iter(|| measure_species(&species, &forest, true).unwrap())
     });
 }
 

@@ -11,7 +11,7 @@
 //! let camera = scene.camera(None)?.clone();
 //! let plan = canopy::plan::Plan::new(&scene, &camera, [1024, 768], false, Some(gpu.info()))?;
 //! let cache = canopy::bake::cache::default_dir();
-//! let baked = canopy::bake::load_or_bake_scene(&scene, cache.as_deref(), false)?;
+//! let baked = canopy::bake::load_or_bake_scene(&scene, &plan, cache.as_deref(), false)?;
 //! let baked: Vec<_> = baked.into_iter().map(|(species, _)| species).collect();
 //! let mut renderer = canopy::frame::Renderer::new(&gpu, scene.clone(), plan, &baked)?;
 //! renderer.render(&camera, canopy::camera::auto_exposure(&scene))?;

@@ -2,12 +2,14 @@
 
 mod common;
 
+use std::cell::Cell;
 use std::f64::consts::PI;
 use std::fs;
 use std::sync::OnceLock;
 
 use canopy::bake::tables::{
-    Cast, CrownModel, FieldCrown, ForestSettings, LeafOptics, Seen, key, load_or_measure, measure, path,
+    Cast, CrownModel, FieldCrown, ForestSettings, LeafOptics, Seen, key, load_or_measure, measure,
+    measure_species, path,
 };
 use canopy::bake::{BakeSettings, CacheState, SpeciesBake, bake_species};
 use canopy::physics::crown::{Crown, Frame};
@@ -92,9 +94,12 @@ fn ellipsoids() -> &'static SpeciesBake {
 const TINY: ForestSettings =
     ForestSettings { angles: 4, densities: 3, rays: 128, scale_range: [0.8, 1.2], poisson: false, ..SMALL };
 
+/// Stands for the key of what a species is baked from.
+const SOURCE: [u8; 32] = [7; 32];
+
 fn tiny() -> &'static ForestTables {
     static TABLES: OnceLock<ForestTables> = OnceLock::new();
-    TABLES.get_or_init(|| load_or_measure(ellipsoids(), &TINY, None, true).unwrap().0)
+    TABLES.get_or_init(|| measure_species(ellipsoids(), &TINY, true).unwrap())
 }
 
 /// Overlap of the shadows of a sphere of radius r at height h: on level ground, from directions at zenith angles θ_v, θ_l and
@@ -278,10 +283,10 @@ fn tables_are_sound() {
     // So sparse that hardly a ray meets a tree, and so dense that none gets through.
     for pattern_density in [1e-7, 3.0] {
         let forest = ForestSettings { pattern_density, rays: 32, ..TINY };
-        sound(&load_or_measure(ellipsoids(), &forest, None, true).unwrap().0);
+        sound(&measure_species(ellipsoids(), &forest, true).unwrap());
     }
     let still = ForestSettings { light_iterations: 0, view_iterations: 1, rays: 32, densities: 9, ..TINY };
-    sound(&load_or_measure(ellipsoids(), &still, None, true).unwrap().0);
+    sound(&measure_species(ellipsoids(), &still, true).unwrap());
 }
 
 #[test]
@@ -296,7 +301,9 @@ fn settings_out_of_range_are_refused() {
         ForestSettings { scale_range: [1.0, f32::NAN], ..TINY },
         ForestSettings { view_iterations: 0, ..TINY },
     ] {
-        assert!(load_or_measure(ellipsoids(), &forest, None, true).is_err(), "{forest:?}");
+        assert!(measure_species(ellipsoids(), &forest, true).is_err(), "{forest:?}");
+        let never = || -> canopy::Result<&SpeciesBake> { panic!("{forest:?} asked for a species") };
+        assert!(load_or_measure((None, &SOURCE), &forest, never, true).is_err(), "{forest:?}");
     }
 }
 
@@ -304,7 +311,7 @@ fn settings_out_of_range_are_refused() {
 fn any_number_of_threads_measures_the_same_bits() {
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let again = pool.install(|| load_or_measure(ellipsoids(), &TINY, None, true).unwrap().0);
+        let again = pool.install(|| measure_species(ellipsoids(), &TINY, true).unwrap());
         assert!(again == *tiny(), "{threads} threads");
     }
 }
@@ -312,10 +319,18 @@ fn any_number_of_threads_measures_the_same_bits() {
 #[test]
 fn tables_come_back_from_the_cache_and_damage_does_not() {
     let dir = tempfile::tempdir().unwrap();
-    let get = || load_or_measure(ellipsoids(), &TINY, Some(dir.path()), true).unwrap();
+    let asked = Cell::new(0);
+    let get = || {
+        let species = || {
+            asked.set(asked.get() + 1);
+            Ok(ellipsoids())
+        };
+        load_or_measure((Some(dir.path()), &SOURCE), &TINY, species, true).unwrap()
+    };
     assert!(get() == (tiny().clone(), CacheState::Baked));
     assert!(get() == (tiny().clone(), CacheState::Hit));
-    let file = path(dir.path(), &key(ellipsoids(), &TINY));
+    assert_eq!(asked.get(), 1, "tables from the cache need no species");
+    let file = path(dir.path(), &key(&SOURCE, &TINY));
     let whole = fs::read(&file).unwrap();
     for at in [0, 9, 20, 50, whole.len() / 2, whole.len() - 1] {
         let mut bytes = whole.clone();
@@ -330,8 +345,9 @@ fn tables_come_back_from_the_cache_and_damage_does_not() {
 
 #[test]
 fn everything_that_tables_depend_on_is_in_the_key() {
-    let bake = ellipsoids();
-    let mut keys = vec![key(bake, &TINY)];
+    let mut other = SOURCE;
+    other[31] ^= 1;
+    let mut keys = vec![key(&SOURCE, &TINY), key(&other, &TINY)];
     for forest in [
         ForestSettings { angles: 5, ..TINY },
         ForestSettings { densities: 4, ..TINY },
@@ -343,21 +359,7 @@ fn everything_that_tables_depend_on_is_in_the_key() {
         ForestSettings { light_iterations: 2, ..TINY },
         ForestSettings { view_iterations: 3, ..TINY },
     ] {
-        keys.push(key(bake, &forest));
-    }
-    let changes: [fn(&mut SpeciesBake); 7] = [
-        |b| b.crown.extinction *= 1.1,
-        |b| b.reflectance[1] *= 1.1,
-        |b| b.turned.slope += 0.1,
-        |b| b.crown.base += 0.1,
-        |b| b.crown.radius += 0.1,
-        |b| b.views.levels[0][5000] ^= 1,
-        |b| b.crown.frame.half_width += 0.1,
-    ];
-    for change in changes {
-        let mut other = bake.clone();
-        change(&mut other);
-        keys.push(key(&other, &TINY));
+        keys.push(key(&SOURCE, &forest));
     }
     let count = keys.len();
     keys.sort_unstable();

@@ -1,17 +1,27 @@
-//! Bakes on disk, keyed by content: the scalars of [`SpeciesBake`], then the bytes of every mip level.
+//! Bakes on disk, each artefact in a file of its own under a key of what it is made of, so that one knob does not bake all anew:
+//!
+//! - `.zfield`, the depth views with their occlusion, and the measured crown and optics: of the model and the knobs of views. All
+//!   else is made from these.
+//! - `.transfer`, the light transfer of the views: of these and of the number of bands, whose coefficients are fitted together.
+//! - `.forest`, the tables of far forests ([`super::tables`]): of both.
 
 use std::path::{Path, PathBuf};
 
 use super::file::{Fields, Format, load_or_build};
-use super::{BakeSettings, SpeciesBake, Turned, bake_species, check};
+use super::{
+    BakeSettings, ForestSettings, SpeciesBake, Turned, bake_transfer, bake_views, check, load_or_measure,
+};
 use crate::Result;
 use crate::physics::crown::{Crown, Frame};
+use crate::physics::tables::ForestTables;
 use crate::physics::transfer::Transfer;
 use crate::physics::views;
 use crate::physics::zfield::ZField;
 use crate::scene::{Mesh, OpticsOverride};
 
-const FORMAT: Format = Format { magic: *b"CANOPYZF", version: 13, extension: "zfield" };
+const VIEWS: Format = Format { magic: *b"CANOPYZF", version: 13, extension: "zfield" };
+const TRANSFER: Format = Format { magic: *b"CANOPYLT", version: 1, extension: "transfer" };
+/// Numbers at the head of a file of views.
 const SCALARS: usize = 23;
 
 /// Where a bake came from.
@@ -45,43 +55,134 @@ pub fn default_dir() -> Option<PathBuf> {
         .or_else(|| var("HOME").map(|d| d.join(".cache").join("canopy")))
 }
 
-/// The bake of a mesh, from the cache in `cache_dir` if it is there, else baked and put there. With `None`
-/// nothing is read or written.
+/// A species to bake, and where its bakes are kept.
 ///
-/// A cache that is damaged or cannot be written costs time and a line on the standard error (none when
-/// `quiet`), never the result. Errors are those of [`bake_species`].
-pub fn load_or_bake(
-    mesh: &Mesh,
-    optics: &OpticsOverride,
-    settings: &BakeSettings,
-    cache_dir: Option<&Path>,
+/// A cache that is damaged or cannot be written costs time and a line on the standard error (none when quiet), never the
+/// result.
+pub struct Source<'a> {
+    mesh: &'a Mesh,
+    optics: &'a OpticsOverride,
+    settings: BakeSettings,
+    dir: Option<&'a Path>,
     quiet: bool,
-) -> Result<(SpeciesBake, CacheState)> {
-    check(settings)?;
-    if cache_dir.is_none() {
-        return Ok((bake_species(mesh, optics, settings, quiet)?, CacheState::Baked));
-    }
-    let sizes: Vec<usize> = std::iter::once(4 * SCALARS).chain(level_sizes(settings)).collect();
-    load_or_build(
-        (cache_dir, &FORMAT, &key(mesh, optics, settings)),
-        &sizes,
-        |parts| decode(parts, settings),
-        |bake, put| {
-            put(&scalars(bake).map(f32::to_le_bytes).concat())?;
-            bake.views.levels.iter().chain(bake.transfer.bands.iter().flatten()).try_for_each(|l| put(l))
-        },
-        || bake_species(mesh, optics, settings, quiet),
-        quiet,
-    )
+    views: [u8; 32],
+    transfer: Option<[u8; 32]>,
 }
 
-/// BLAKE3 of everything that a bake depends on: geometry, masks and colours, optical overrides, settings and
-/// the version of the bake. Vertex normals and material names have no part in it.
-pub fn key(mesh: &Mesh, optics: &OpticsOverride, settings: &BakeSettings) -> [u8; 32] {
+impl<'a> Source<'a> {
+    /// A mesh to be baked with some settings; with `None` for a cache nothing is read or written.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] for settings out of range.
+    pub fn new(
+        mesh: &'a Mesh,
+        optics: &'a OpticsOverride,
+        settings: &BakeSettings,
+        dir: Option<&'a Path>,
+        quiet: bool,
+    ) -> Result<Self> {
+        check(settings)?;
+        let views = views_key(mesh, optics, settings);
+        let transfer = transfer_key(&views, settings.transfer_bands);
+        Ok(Source { mesh, optics, settings: *settings, dir, quiet, views, transfer })
+    }
+
+    /// The bake without light transfer, from the cache if it is there, else baked and put there.
+    ///
+    /// # Errors
+    /// Those of [`bake_views`].
+    pub fn load_views(&self) -> Result<(SpeciesBake, CacheState)> {
+        let sizes: Vec<usize> = std::iter::once(4 * SCALARS)
+            .chain(level_sizes(self.settings.rings, self.settings.resolution))
+            .collect();
+        load_or_build(
+            (self.dir, &VIEWS, &self.views),
+            &sizes,
+            |parts| decode(parts, &self.settings),
+            |bake, put| {
+                put(&scalars(bake).map(f32::to_le_bytes).concat())?;
+                bake.views.levels.iter().try_for_each(|l| put(l))
+            },
+            || bake_views(self.mesh, self.optics, &self.settings, self.quiet),
+            self.quiet,
+        )
+    }
+
+    /// Gives a bake its light transfer, likewise; `None` if the settings ask for none.
+    ///
+    /// # Errors
+    /// Those of [`bake_transfer`].
+    pub fn load_transfer(&self, bake: &mut SpeciesBake) -> Result<Option<CacheState>> {
+        let Some(key) = &self.transfer else { return Ok(None) };
+        let (bands, resolution) = (self.settings.transfer_bands, self.settings.resolution / 2);
+        let band: Vec<usize> = level_sizes(self.settings.rings, resolution).collect();
+        let (transfer, state) = load_or_build(
+            (self.dir, &TRANSFER, key),
+            &band.repeat(bands as usize),
+            |parts| Transfer { resolution, bands: parts.chunks(band.len()).map(<[_]>::to_vec).collect() },
+            |transfer, put| transfer.bands.iter().flatten().try_for_each(|l| put(l)),
+            || bake_transfer(self.mesh, bake, bands, self.quiet),
+            self.quiet,
+        )?;
+        bake.transfer = transfer;
+        Ok(Some(state))
+    }
+
+    /// The tables of a forest of the species, likewise. Light transfer has a part in them: where they have to be measured, the
+    /// bake gets its own first, if it has none, and `transfer` says from where.
+    ///
+    /// # Errors
+    /// Those of [`load_or_measure`] and [`Source::load_transfer`].
+    pub fn load_tables(
+        &self,
+        forest: &ForestSettings,
+        bake: &mut SpeciesBake,
+        transfer: &mut Option<CacheState>,
+    ) -> Result<(ForestTables, CacheState)> {
+        let whole = move || {
+            let bake = bake;
+            if transfer.is_none() {
+                *transfer = self.load_transfer(bake)?;
+            }
+            Ok(&*bake)
+        };
+        load_or_measure((self.dir, &self.key()), forest, whole, self.quiet)
+    }
+
+    /// BLAKE3 of everything that the whole bake depends on.
+    pub fn key(&self) -> [u8; 32] {
+        self.transfer.unwrap_or(self.views)
+    }
+
+    /// The file of the views, if there is a cache.
+    pub fn views_path(&self) -> Option<PathBuf> {
+        Some(VIEWS.path(self.dir?, &self.views))
+    }
+
+    /// The file of the light transfer, if there is a cache and the settings ask for any.
+    pub fn transfer_path(&self) -> Option<PathBuf> {
+        Some(TRANSFER.path(self.dir?, self.transfer.as_ref()?))
+    }
+}
+
+/// BLAKE3 of everything that the light transfer of some views depends on; `None` without bands.
+fn transfer_key(views: &[u8; 32], bands: u32) -> Option<[u8; 32]> {
+    let mut fields = Fields::new("canopy light transfer");
+    fields.put(&TRANSFER.version.to_le_bytes());
+    fields.put(&bands.to_le_bytes());
+    fields.put(views);
+    (bands > 0).then(|| fields.key())
+}
+
+/// BLAKE3 of everything that views depend on: geometry, masks and colours, optical overrides, the knobs of views and
+/// the version of the bake. Vertex normals, material names and light transfer have no part in it.
+pub fn views_key(mesh: &Mesh, optics: &OpticsOverride, settings: &BakeSettings) -> [u8; 32] {
     let mut fields = Fields::new("canopy species bake");
     let mut put = |bytes: &[u8]| fields.put(bytes);
-    put(&FORMAT.version.to_le_bytes());
-    for x in [settings.rings, settings.resolution, settings.occlusion_rays, settings.transfer_bands] {
+    put(&VIEWS.version.to_le_bytes());
+    // Bands of light transfer once stood at the end: with none it is the key that views without them have always had, also as
+    // the identity of models in the results of benches.
+    for x in [settings.rings, settings.resolution, settings.occlusion_rays, 0] {
         put(&x.to_le_bytes());
     }
     for rgb in [optics.leaf_reflectance, optics.leaf_transmittance, optics.bark_reflectance] {
@@ -105,11 +206,6 @@ pub fn key(mesh: &Mesh, optics: &OpticsOverride, settings: &BakeSettings) -> [u8
     fields.key()
 }
 
-/// The file of a key.
-pub fn path(dir: &Path, key: &[u8; 32]) -> PathBuf {
-    FORMAT.path(dir, key)
-}
-
 fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
     let ([r0, r1, r2], [t0, t1, t2], [b0, b1, b2]) = (b.reflectance, b.transmittance, b.bark_reflectance);
     let Crown {
@@ -129,21 +225,14 @@ fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
     all
 }
 
-/// Bytes of every level of z-field and transfer, from the settings alone.
-fn level_sizes(settings: &BakeSettings) -> impl Iterator<Item = usize> {
-    let views = views::count(settings.rings) as usize;
-    let levels = move |resolution: u32| {
-        (0..=resolution.ilog2()).map(move |l| views * 4 * (resolution as usize >> l).pow(2))
-    };
-    let transfer = (0..settings.transfer_bands).flat_map(move |_| levels(settings.resolution / 2));
-    levels(settings.resolution).chain(transfer)
+/// Bytes of every mip level of `rings` rings of views of `resolution`² texels.
+fn level_sizes(rings: u32, resolution: u32) -> impl Iterator<Item = usize> {
+    let count = views::count(rings) as usize;
+    (0..=resolution.ilog2()).map(move |l| count * 4 * (resolution as usize >> l).pow(2))
 }
 
 fn decode(mut parts: Vec<Vec<u8>>, settings: &BakeSettings) -> SpeciesBake {
-    let mut levels = parts.split_off(1);
-    let transfer = levels.split_off(settings.resolution.ilog2() as usize + 1);
-    let resolution = if settings.transfer_bands > 0 { settings.resolution / 2 } else { 0 };
-    let bands = transfer.chunks(settings.resolution.ilog2() as usize).map(<[_]>::to_vec).collect();
+    let levels = parts.split_off(1);
     let mut x = [0f32; SCALARS];
     for (x, from) in x.iter_mut().zip(parts[0].as_chunks::<4>().0) {
         *x = f32::from_le_bytes(*from);
@@ -156,7 +245,7 @@ fn decode(mut parts: Vec<Vec<u8>>, settings: &BakeSettings) -> SpeciesBake {
     let frame = Frame { centre, half_width, half_height };
     SpeciesBake {
         views: ZField { n: settings.rings, resolution: settings.resolution, levels },
-        transfer: Transfer { resolution, bands },
+        transfer: Transfer::default(),
         crown: Crown { frame, radius, base, height, leaf_shadow, extinction },
         turned: Turned { reflected, slope, passed, bark_reflected, bark_share },
         reflectance: [r0, r1, r2],

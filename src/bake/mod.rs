@@ -14,8 +14,8 @@ mod transfer;
 mod verify;
 mod views;
 
-pub use cache::{CacheState, load_or_bake};
-pub use scene::{Baked, BakedFrom, forest_settings, load_or_bake_scene, pattern_density};
+pub use cache::{CacheState, Source};
+pub use scene::{Baked, BakedFrom, Needs, forest_settings, load_or_bake_scene, pattern_density};
 pub use self_shadow::{LitCell, lit_cells};
 pub use tables::{ForestSettings, load_or_measure};
 pub use verify::{QualityReport, ViewQuality, demand, verify};
@@ -35,7 +35,7 @@ use surface::Surface;
 pub struct SpeciesBake {
     /// The depth views.
     pub views: ZField,
-    /// Light transfer of the same views.
+    /// Light transfer of the same views; empty where none is wanted.
     pub transfer: Transfer,
     /// Proportions and self-shadow.
     pub crown: Crown,
@@ -147,6 +147,21 @@ pub fn bake_species(
     settings: &BakeSettings,
     quiet: bool,
 ) -> Result<SpeciesBake> {
+    let mut bake = bake_views(mesh, optics, settings, quiet)?;
+    bake.transfer = bake_transfer(mesh, &bake, settings.transfer_bands, quiet)?;
+    Ok(bake)
+}
+
+/// Bakes all of a species but its light transfer.
+///
+/// # Errors
+/// As [`bake_species`].
+pub fn bake_views(
+    mesh: &Mesh,
+    optics: &OpticsOverride,
+    settings: &BakeSettings,
+    quiet: bool,
+) -> Result<SpeciesBake> {
     check(settings)?;
     let surface = Surface::new(mesh)?;
     let solid: Vec<bool> =
@@ -156,7 +171,13 @@ pub fn bake_species(
     let progress = Progress::new("baking views", u64::from(count), quiet);
     let field = views::draw(&surface, &occlusion, settings.rings, settings.resolution, &progress);
     progress.finish();
-    let mut bake = optics::species(mesh, &surface, field, optics);
-    bake.transfer = transfer::draw(mesh, &surface, &bake, settings.transfer_bands, quiet);
-    Ok(bake)
+    Ok(optics::species(mesh, &surface, field, optics))
+}
+
+/// Bakes the light transfer of a species' views, in `bands` bands.
+///
+/// # Errors
+/// [`Error::Usage`] for a mesh without extent.
+pub fn bake_transfer(mesh: &Mesh, bake: &SpeciesBake, bands: u32, quiet: bool) -> Result<Transfer> {
+    Ok(transfer::draw(mesh, &Surface::new(mesh)?, bake, bands, quiet))
 }

@@ -3,9 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{CacheState, ForestSettings, SpeciesBake, load_or_bake, load_or_measure};
+use super::{CacheState, ForestSettings, Source, SpeciesBake};
 use crate::Result;
 use crate::physics::tables::ForestTables;
+use crate::plan::Plan;
 use crate::scene::{Distribution, Scene};
 
 /// One species, ready to draw.
@@ -20,10 +21,35 @@ pub struct Baked {
 /// Where the parts of a [`Baked`] came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BakedFrom {
-    /// The z-field.
-    pub species: CacheState,
+    /// The z-field's views.
+    pub views: CacheState,
+    /// Their light transfer; `None` where nothing needed it.
+    pub transfer: Option<CacheState>,
     /// The tables.
     pub tables: CacheState,
+}
+
+/// What is needed of a scene's species.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Needs {
+    /// Their views and tables. Whatever stands for a tree, near or far, needs both: tables are measured from views, and tell
+    /// near trees of the sky's light among others. Nor do tables come apart, into those of a sun, which a plan without pair
+    /// tables does not read, and those of the sky: an even sky is many suns, and its light is summed up from theirs.
+    pub trees: bool,
+    /// The light transfer of the views, to draw trees one by one. Measuring tables needs it as well and gets it by itself; once
+    /// they are in the cache, a plan without z-fields or without a sun does without.
+    pub transfer: bool,
+}
+
+impl Needs {
+    /// All, for whoever draws by several plans.
+    pub const ALL: Needs = Needs { trees: true, transfer: true };
+}
+
+impl From<&Plan> for Needs {
+    fn from(plan: &Plan) -> Self {
+        Needs { trees: plan.forest, transfer: plan.transfer_bands > 0 }
+    }
 }
 
 /// Full density of the point pattern that a scene's densities thin, trees per m²; or, in a scene of lists only, of the lists.
@@ -53,18 +79,28 @@ pub fn forest_settings(scene: &Scene, species: usize) -> ForestSettings {
     ForestSettings::new(&scene.settings, density, kind.scale, poisson)
 }
 
-/// Everything that drawing a scene's trees needs, from the cache in `dir` where it is there.
+/// What is needed of a scene's species, one after the other, from the cache in `dir` where it is there; nothing where no trees
+/// are.
 ///
 /// # Errors
-/// As [`load_or_bake`] and [`load_or_measure`].
-pub fn load_or_bake_scene(scene: &Scene, dir: Option<&Path>, quiet: bool) -> Result<Vec<(Baked, BakedFrom)>> {
+/// As [`super::bake_species`] and [`super::load_or_measure`].
+pub fn load_or_bake_scene(
+    scene: &Scene,
+    needs: impl Into<Needs>,
+    dir: Option<&Path>,
+    quiet: bool,
+) -> Result<Vec<(Baked, BakedFrom)>> {
     let _bake = tracing::info_span!("bake").entered();
+    let needs = needs.into();
     let mut all = Vec::new();
-    for (k, s) in scene.species.iter().enumerate() {
-        let (species, baked) = load_or_bake(&s.mesh, &s.optics, &(&scene.settings).into(), dir, quiet)?;
-        let (tables, measured) = load_or_measure(&species, &forest_settings(scene, k), dir, quiet)?;
-        let one = Baked { species: Arc::new(species), tables: Arc::new(tables) };
-        all.push((one, BakedFrom { species: baked, tables: measured }));
+    for (k, s) in scene.species.iter().enumerate().filter(|_| needs.trees) {
+        let source = Source::new(&s.mesh, &s.optics, &(&scene.settings).into(), dir, quiet)?;
+        let (mut species, views) = source.load_views()?;
+        let mut transfer = if needs.transfer { source.load_transfer(&mut species)? } else { None };
+        let (measured, tables) =
+            source.load_tables(&forest_settings(scene, k), &mut species, &mut transfer)?;
+        let one = Baked { species: Arc::new(species), tables: Arc::new(measured) };
+        all.push((one, BakedFrom { views, transfer, tables }));
     }
     Ok(all)
 }

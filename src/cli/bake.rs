@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use canopy::Result;
 use canopy::bake::tables::{self, ForestSettings};
-use canopy::bake::{self, BakeSettings, SpeciesBake, cache, load_or_bake};
+use canopy::bake::{self, BakeSettings, CacheState, Source, SpeciesBake, cache};
 use canopy::scene::{Mesh, OpticsOverride};
 use canopy::settings::Settings;
 
@@ -22,7 +22,9 @@ Examples:
   canopy bake oak.glb --verify 64 --min-iou 0.8   and exit code 1 if it is worse than that
   canopy bake oak.glb --set view_rings=6    with fewer views
   canopy bake oak.glb --forest 0.03         and the tables of a far forest of 0.03 trees per m²
-Bakes are kept in $CANOPY_CACHE, else $XDG_CACHE_HOME/canopy, else ~/.cache/canopy.";
+Bakes are kept in $CANOPY_CACHE, else $XDG_CACHE_HOME/canopy, else ~/.cache/canopy: views (.zfield), light transfer (.transfer)
+and tables (.forest) apart. Of each it is said whether it was read from there (hit), baked, or baked again because the file
+was damaged (rebuilt).";
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{}", knobs_help()))]
@@ -70,6 +72,17 @@ struct Optics {
     leaf_transmittance: [f32; 3],
 }
 
+/// Light transfer of the views.
+#[derive(serde::Serialize)]
+struct Transfer {
+    bands: u32,
+    resolution: u32,
+    bytes: usize,
+    cache: &'static str,
+    path: Option<String>,
+    seconds: f64,
+}
+
 /// Tables of a far forest.
 #[derive(serde::Serialize)]
 struct Forest {
@@ -92,9 +105,12 @@ struct Baked {
     views: u32,
     resolution: u32,
     bytes: usize,
+    /// Of the views, with crown and optics.
     cache: &'static str,
     path: Option<String>,
+    /// Of all but the tables.
     seconds: f64,
+    transfer: Option<Transfer>,
     optics: Optics,
     verify: Vec<Quality>,
     forest: Option<Forest>,
@@ -142,16 +158,28 @@ fn one(
     let wanted = BakeSettings::from(settings);
     let dir = cache::default_dir();
     let start = Instant::now();
-    let (bake, from) = load_or_bake(mesh, optics, &wanted, dir.as_deref(), args.print.quiet)?;
-    let seconds = start.elapsed().as_secs_f64();
-    let path = dir.map(|d| cache::path(&d, &cache::key(mesh, optics, &wanted))).filter(|p| p.is_file());
+    let source = Source::new(mesh, optics, &wanted, dir.as_deref(), args.print.quiet)?;
+    let (mut bake, from) = source.load_views()?;
+    let begun = Instant::now();
+    let state = source.load_transfer(&mut bake)?;
+    let (seconds, transfer_s) = (start.elapsed().as_secs_f64(), begun.elapsed().as_secs_f64());
+    let transfer = state.map(|state| Transfer {
+        bands: wanted.transfer_bands,
+        resolution: bake.transfer.resolution,
+        bytes: bake.transfer.bands.iter().flatten().map(Vec::len).sum(),
+        cache: state.name(),
+        path: kept(source.transfer_path()),
+        seconds: transfer_s,
+    });
     let verify = match args.verify {
         Some(n) => {
             (1..=settings.view_iterations).map(|i| quality(mesh, &bake, n, i)).collect::<Result<_>>()?
         }
         None => Vec::new(),
     };
-    let forest = args.forest.map(|d| forest(args, &bake, scale, d, settings)).transpose()?;
+    let tables =
+        |density| forest(&source, (&mut bake, state), ForestSettings::new(settings, density, scale, false));
+    let forest = args.forest.map(tables).transpose()?;
     Ok(Baked {
         name,
         triangles: mesh.triangles.len(),
@@ -159,8 +187,9 @@ fn one(
         resolution: wanted.resolution,
         bytes: bake.views.levels.iter().map(Vec::len).sum(),
         cache: from.name(),
-        path: path.map(|p| p.display().to_string()),
+        path: kept(source.views_path()),
         seconds,
+        transfer,
         optics: Optics {
             height_m: bake.crown.height,
             crown_radius_m: bake.crown.radius,
@@ -175,20 +204,21 @@ fn one(
     })
 }
 
+/// A file of the cache, if it is there.
+fn kept(path: Option<PathBuf>) -> Option<String> {
+    Some(path.filter(|p| p.is_file())?.display().to_string())
+}
+
 /// Measures the tables of a species, or reads them.
 fn forest(
-    args: &Args,
-    bake: &SpeciesBake,
-    scale: [f32; 2],
-    density: f64,
-    settings: &Settings,
+    source: &Source,
+    (bake, mut transfer): (&mut SpeciesBake, Option<CacheState>),
+    wanted: ForestSettings,
 ) -> Result<Forest> {
-    let wanted = ForestSettings::new(settings, density, scale, false);
-    let dir = cache::default_dir();
     let start = Instant::now();
-    let (t, from) = tables::load_or_measure(bake, &wanted, dir.as_deref(), args.print.quiet)?;
+    let (t, from) = source.load_tables(&wanted, bake, &mut transfer)?;
     let seconds = start.elapsed().as_secs_f64();
-    let path = dir.map(|d| tables::path(&d, &tables::key(bake, &wanted))).filter(|p| p.is_file());
+    let path = cache::default_dir().map(|d| tables::path(&d, &tables::key(&source.key(), &wanted)));
     let x = f64::from(t.max_thickness);
     let sample = |degrees: f64| {
         let a = degrees.to_radians();
@@ -196,10 +226,10 @@ fn forest(
         [degrees, canopy::physics::tables::visible_ground(&t, a, x), leaf + bark]
     };
     Ok(Forest {
-        trees_per_m2: density,
+        trees_per_m2: wanted.pattern_density,
         max_thickness: t.max_thickness,
         cache: from.name(),
-        path: path.map(|p| p.display().to_string()),
+        path: kept(path),
         seconds,
         ground_error: t.pair_stderr.iter().map(|e| e[0]).fold(0.0, f32::max),
         tree_light_error: t.pair_stderr.iter().map(|e| e[1]).fold(0.0, f32::max),
@@ -222,6 +252,12 @@ fn quality(mesh: &Mesh, bake: &SpeciesBake, directions: u32, iterations: u32) ->
 
 fn text(b: &Baked) -> String {
     let o = &b.optics;
+    let transfer = b.transfer.as_ref();
+    let bands = |t: &Transfer| {
+        format!("{} of {2} x {2} texels, {}", t.bands, output::bytes(t.bytes as u64), t.resolution)
+    };
+    let cached =
+        |cache: &str, path: &Option<String>| format!("{cache} {}", path.as_deref().unwrap_or("(not kept)"));
     let rgb = |c: [f32; 3]| format!("{:.4} {:.4} {:.4}", c[0], c[1], c[2]);
     let mut table = Table::new(2, &[b.name.as_str(), ""]);
     for (what, value) in [
@@ -230,6 +266,7 @@ fn text(b: &Baked) -> String {
             "views",
             format!("{} of {2} x {2} texels, {}", b.views, output::bytes(b.bytes as u64), b.resolution),
         ),
+        ("bands of light transfer", transfer.map_or("none".into(), bands)),
         ("height", format!("{:.2} m", o.height_m)),
         ("crown", format!("radius {:.2} m, from {:.2} m up", o.crown_radius_m, o.crown_base_m)),
         ("projected area", format!("{:.2} m²", o.projected_area_m2)),
@@ -237,7 +274,8 @@ fn text(b: &Baked) -> String {
         ("leaf reflectance", rgb(o.leaf_reflectance)),
         ("leaf transmittance", rgb(o.leaf_transmittance)),
         ("time", format!("{:.2} s", b.seconds)),
-        ("cache", format!("{} {}", b.cache, b.path.as_deref().unwrap_or("(not kept)"))),
+        ("cache: views", cached(b.cache, &b.path)),
+        ("cache: light transfer", transfer.map_or("not asked for".into(), |t| cached(t.cache, &t.path))),
     ] {
         table.row([format!("  {what}"), value]);
     }
@@ -245,10 +283,9 @@ fn text(b: &Baked) -> String {
     if let Some(f) = &b.forest {
         let title = format!("  forest of {} trees per m²", f.trees_per_m2);
         let mut table = Table::new(2, &[title.as_str(), ""]);
-        let cache = format!("{} {}", f.cache, f.path.as_deref().unwrap_or("(not kept)"));
         table.row(["  λA".into(), format!("{:.3}", f.max_thickness)]);
         table.row(["  time".into(), format!("{:.2} s", f.seconds)]);
-        table.row(["  cache".into(), cache]);
+        table.row(["  cache: tables".into(), cached(f.cache, &f.path)]);
         table.row([
             "  largest error of G, T".into(),
             format!("{:.4}, {:.4}", f.ground_error, f.tree_light_error),

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use canopy::bake::{Baked, cache, load_or_bake_scene};
+use canopy::bake::{Baked, Needs, cache, load_or_bake_scene};
 use canopy::gpu::Gpu;
 use canopy::ladder::Ladder;
 use canopy::measure::reflectance::{Measured, Method, Request, mean_densities, measure, measure_reference};
@@ -245,7 +245,7 @@ fn all(args: &Args, scene: &Scene, camera: &Camera, densities: &[f64]) -> Result
     let renders = settings.iter().any(|s| s.drawn != Drawn::Reference);
     // Before the progress bar: baking has its own.
     let baked: Vec<Baked> = if renders {
-        let found = load_or_bake_scene(scene, cache::default_dir().as_deref(), args.print.quiet)?;
+        let found = load_or_bake_scene(scene, Needs::ALL, cache::default_dir().as_deref(), args.print.quiet)?;
         found.into_iter().map(|(b, _)| b).collect()
     } else {
         Vec::new()

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use canopy::bake::{Baked, cache, load_or_bake_scene};
+use canopy::bake::{Baked, CacheState, cache, load_or_bake_scene};
 use canopy::camera::{Eye, auto_exposure};
 use canopy::frame::{FrameReport, Renderer};
 use canopy::gpu::{DeviceInfo, FrameCapture, Gpu, PassTime, Stamps, TimingOptions};
@@ -137,7 +137,11 @@ struct Timings {
 #[derive(serde::Serialize)]
 struct Bake<'a> {
     species: &'a str,
+    /// Where its views came from.
     cache: &'static str,
+    /// Where their light transfer came from; null where nothing needed it.
+    transfer: Option<&'static str>,
+    /// Where its tables came from.
     tables: &'static str,
 }
 
@@ -281,11 +285,11 @@ fn draw(
     let scene = Arc::new(scene);
     let start = Instant::now();
     let (mut baked, mut states): (Vec<Baked>, Vec<Bake>) = (Vec::new(), Vec::new());
-    let found = load_or_bake_scene(&scene, cache::default_dir().as_deref(), quiet)?;
+    let found = load_or_bake_scene(&scene, &plan, cache::default_dir().as_deref(), quiet)?;
     for (s, (bake, from)) in scene.species.iter().zip(found) {
         baked.push(bake);
-        let (cache, tables) = (from.species.name(), from.tables.name());
-        states.push(Bake { species: &s.name, cache, tables });
+        let (cache, transfer) = (from.views.name(), from.transfer.map(CacheState::name));
+        states.push(Bake { species: &s.name, cache, transfer, tables: from.tables.name() });
     }
     let bake_s = start.elapsed().as_secs_f64();
 
@@ -453,7 +457,9 @@ fn text(r: &Report) -> String {
 
     let mut time = Table::new(1, &["time", "s"]);
     let t = &r.timings;
-    let baked = r.bakes.iter().filter(|b| b.cache != "hit").count();
+    let made =
+        |b: &&Bake| [Some(b.cache), b.transfer, Some(b.tables)].into_iter().flatten().any(|c| c != "hit");
+    let baked = r.bakes.iter().filter(made).count();
     let bakes = format!("bake ({baked} made, {} from the cache)", r.bakes.len() - baked);
     for (what, s) in [("load".into(), t.load_s), (bakes, t.bake_s), ("build".into(), t.build_s)] {
         time.row([what, format!("{s:.3}")]);

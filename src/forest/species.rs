@@ -42,8 +42,13 @@ impl SpeciesData {
     /// Uploads baked species.
     ///
     /// # Errors
-    /// [`Error::Device`] when out of memory.
+    /// [`Error::Usage`] for bakes of other species or settings, or without what the plan needs; [`Error::Device`] when out of
+    /// memory.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, baked: &[Baked]) -> Result<Self> {
+        if baked.len() != scene.species.len() {
+            let (has, wants) = (baked.len(), scene.species.len());
+            return Err(Error::Usage(format!("{has} species were baked of the scene's {wants}")));
+        }
         let n = scene.settings.view_rings;
         let view_count = views::count(n);
         let resolution = scene.settings.view_resolution;
@@ -138,7 +143,11 @@ fn transfer(gpu: &Gpu, plan: &Plan, baked: &[Baked], band: u32) -> Result<Image>
     let image = gpu.image(described)?;
     for (k, bake) in baked.iter().map(|b| &b.species).enumerate() {
         let view_count = views::count(bake.views.n);
-        for (level, bytes) in bake.transfer.bands[band as usize].iter().enumerate() {
+        let Some(levels) = bake.transfer.bands.get(band as usize) else {
+            let message = "a species was baked without the light transfer that the plan lists";
+            return Err(Error::Usage(message.into()));
+        };
+        for (level, bytes) in levels.iter().enumerate() {
             gpu.upload_image(&image, level as u32, k as u32 * view_count, view_count, bytes)?;
         }
     }

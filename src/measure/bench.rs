@@ -58,10 +58,10 @@ impl Subject {
     /// Those of [`load_or_bake_scene`] and [`Renderer::new`].
     pub fn new(gpu: &Gpu, scene: Scene, plan: Plan, cache: Option<&Path>, quiet: bool) -> Result<Self> {
         let start = Instant::now();
-        let found = load_or_bake_scene(&scene, cache, quiet)?;
+        let found = load_or_bake_scene(&scene, &plan, cache, quiet)?;
         let bake_s = start.elapsed().as_secs_f64();
         let named = scene.species.iter().zip(&found);
-        let bake_cache = named.map(|(s, (_, from))| (s.name.clone(), from.species.name().into())).collect();
+        let bake_cache = named.map(|(s, (_, from))| (s.name.clone(), from.views.name().into())).collect();
         let baked: Vec<Baked> = found.into_iter().map(|(baked, _)| baked).collect();
         let start = Instant::now();
         let renderer = Renderer::new(gpu, Arc::new(scene), plan, &baked)?;

@@ -110,7 +110,7 @@ impl SceneIdentity {
         let fixed =
             crate::bake::BakeSettings { rings: 1, resolution: 16, occlusion_rays: 8, transfer_bands: 0 };
         for s in &scene.species {
-            let model = crate::bake::cache::key(&s.mesh, &s.optics, &fixed);
+            let model = crate::bake::cache::views_key(&s.mesh, &s.optics, &fixed);
             put(format!("species {}", s.name), &(s.scale, &s.distribution), &model);
         }
         put("light".into(), &(scene.sun, &scene.sky), &[]);

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use canopy::bake::{Baked, load_or_bake_scene};
+use canopy::bake::{Baked, Needs, load_or_bake_scene};
 use canopy::camera::Eye;
 use canopy::frame::Renderer;
 use canopy::gpu::interface::Seed;
@@ -85,7 +85,7 @@ pub fn small_scene(text: &str) -> Scene {
 /// Species of a scene, baked once for all tests and runs.
 pub fn bake(scene: &Scene) -> Vec<Baked> {
     let cache = folder().join("bakes");
-    load_or_bake_scene(scene, Some(&cache), true).unwrap().into_iter().map(|(b, _)| b).collect()
+    load_or_bake_scene(scene, Needs::ALL, Some(&cache), true).unwrap().into_iter().map(|(b, _)| b).collect()
 }
 
 /// Index of a seed's species.

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use canopy::bake::load_or_bake_scene;
+use canopy::bake::{Needs, load_or_bake_scene};
 use canopy::camera::Eye;
 use canopy::frame::Renderer;
 use canopy::gpu::Gpu;
@@ -46,8 +46,11 @@ fn camera(azimuth: f64, elevation: f64) -> Camera {
 fn sun(gpu: &Gpu, scene: &Scene, camera: &Camera) -> Vec<f64> {
     let plan = Plan::new(scene, camera, [SIDE; 2], true, Some(gpu.info())).unwrap();
     let cache = device::folder().join("bakes");
-    let baked: Vec<_> =
-        load_or_bake_scene(scene, Some(&cache), true).unwrap().into_iter().map(|(b, _)| b).collect();
+    let baked: Vec<_> = load_or_bake_scene(scene, Needs::ALL, Some(&cache), true)
+        .unwrap()
+        .into_iter()
+        .map(|(b, _)| b)
+        .collect();
     let mut renderer = Renderer::new(gpu, Arc::new(scene.clone()), plan, &baked).unwrap();
     renderer.render(camera, 1.0).unwrap();
     renderer.picture().unwrap().linear.unwrap().sun.iter().map(|c| f64::from(c[1])).collect()
@@ -97,4 +100,25 @@ fn leaves_are_lit_as_their_triangles_are() {
         assert!(found.iter().all(|f| (f.1 - found[0].1).abs() < 0.08), "{found:?}");
     }
     gpu.close().unwrap();
+}
+
+/// A bake for a plan that needs less does not do for one that needs more, and says so.
+#[test]
+fn a_bake_without_the_transfer_that_the_plan_lists_is_refused() {
+    let gpu = device::open();
+    let mut scene = device::small_scene(
+        "[terrain]\nextent = 300.0\nalbedo = 0.2\n[[species]]\nname = \"a\"\nmodel = \"builtin:birch\"\ndensity = 0.03\n\
+         [sun]\nazimuth = 210.0\nelevation = 25.0\nirradiance = 1.0\n\
+         [[camera]]\nname = \"c\"\nposition = [40.0, 60.0, 15.0]\ntarget = [150.0, 180.0, 0.0]\nvertical_fov = 50.0\n",
+    );
+    let baked = device::bake(&scene);
+    assert!(baked[0].species.transfer.bands.is_empty());
+    scene.settings.set("transfer_bands", 1.0).unwrap();
+    let plan = Plan::new(&scene, &scene.cameras[0], [SIDE; 2], true, Some(gpu.info())).unwrap();
+    assert!(plan.transfer_bands > 0);
+    let scene = Arc::new(scene);
+    let error = Renderer::new(&gpu, scene.clone(), plan.clone(), &baked).err().unwrap();
+    assert!(error.exit_code() == 2 && error.to_string().contains("without the light transfer"), "{error}");
+    let error = Renderer::new(&gpu, scene, plan, &[]).err().unwrap();
+    assert!(error.exit_code() == 2 && error.to_string().contains("0 species were baked"), "{error}");
 }

@@ -18,7 +18,7 @@ mod soak;
 
 use std::path::PathBuf;
 
-use canopy::bake::{Baked, load_or_bake_scene};
+use canopy::bake::{Baked, Needs, load_or_bake_scene};
 use canopy::scene::{self, Scene};
 
 /// Where proofs leave what they made.
@@ -46,7 +46,7 @@ fn oaks(density: f64, more: &str) -> (Scene, Vec<Baked>) {
 
 fn bake(scene: &Scene) -> Vec<Baked> {
     let cache = device::folder().join("bakes");
-    load_or_bake_scene(scene, Some(&cache), false).unwrap().into_iter().map(|(b, _)| b).collect()
+    load_or_bake_scene(scene, Needs::ALL, Some(&cache), false).unwrap().into_iter().map(|(b, _)| b).collect()
 }
 
 /// Luminance of a linear colour.

@@ -19,6 +19,7 @@ pub use crown::{Cast, CrownModel, LeafOptics, Seen, TransferAt};
 pub use field::{FieldAim, FieldCrown};
 pub use store::{key, load_or_measure, path};
 
+use crate::bake::SpeciesBake;
 use crate::physics::crown::Crown;
 use crate::physics::tables::ForestTables;
 use crate::progress::Progress;
@@ -126,6 +127,15 @@ fn check(forest: &ForestSettings) -> Result<()> {
         "cannot measure tables with {forest:?}: 4 to 64 angles, 2 to {MOST_DENSITIES} densities, at least one ray, \
          1e-9 to 1000 trees per m², scales above 0 in order, a hole of 0 or more, at least one iteration of the view ray"
     )))
+}
+
+/// Measures tables for a baked species.
+///
+/// # Errors
+/// [`Error::Usage`] for settings out of range.
+pub fn measure_species(bake: &SpeciesBake, forest: &ForestSettings, quiet: bool) -> Result<ForestTables> {
+    let crown = FieldCrown::new(bake, RESOLUTION, forest.view_iterations, forest.light_iterations);
+    measure(&crown, forest, quiet)
 }
 
 /// Measures tables for any crown, on all threads of the current rayon pool; the same bits for any number of them.

@@ -1,34 +1,33 @@
-//! Tables on disk, keyed by the z-field that they are measured from and by all settings.
+//! Tables on disk, under a key of what the z-field is made of that they are measured from, and of all settings.
 
 use std::path::{Path, PathBuf};
 
-use super::crown::LeafOptics;
-use super::field::FieldCrown;
-use super::{ForestSettings, RESOLUTION, check, measure};
+use super::{ForestSettings, check, measure_species};
 use crate::Result;
 use crate::bake::file::{Fields, Format, load_or_build};
 use crate::bake::{CacheState, SpeciesBake};
-use crate::physics::crown::{Crown, Frame};
 use crate::physics::tables::ForestTables;
 
-const FORMAT: Format = Format { magic: *b"CANOPYFT", version: 5, extension: "forest" };
+const FORMAT: Format = Format { magic: *b"CANOPYFT", version: 6, extension: "forest" };
 
-/// The tables of a species in a forest, from the cache in `cache_dir` if they are there, else measured and put there. With
-/// `None` nothing is read or written.
+/// The tables of a species in a forest, from the cache if they are there, else measured and put there; `species` is asked for only
+/// then. With `None` for a cache nothing is read or written; `source` is the key of what the species is baked from
+/// ([`crate::bake::Source::key`]).
 ///
 /// # Errors
-/// [`crate::Error::Usage`] for settings out of range. A cache that is damaged or cannot be written costs only time.
-pub fn load_or_measure(
-    bake: &SpeciesBake,
+/// [`crate::Error::Usage`] for settings out of range, and those of `species`. A cache that is damaged or cannot be written costs
+/// only time.
+pub fn load_or_measure<'a>(
+    (cache_dir, source): (Option<&Path>, &[u8; 32]),
     forest: &ForestSettings,
-    cache_dir: Option<&Path>,
+    species: impl FnOnce() -> Result<&'a SpeciesBake>,
     quiet: bool,
 ) -> Result<(ForestTables, CacheState)> {
     check(forest)?;
     let (n, m) = (forest.angles as usize, forest.densities as usize);
     let pairs = 16 * m * n * n * n;
     load_or_build(
-        (cache_dir, &FORMAT, &key(bake, forest)),
+        (cache_dir, &FORMAT, &key(source, forest)),
         &[24, pairs, pairs, 16 * m * n, 16 * m * n, 8 * m, 8 * m],
         |parts| decode(&parts, forest),
         |t, put| {
@@ -41,16 +40,13 @@ pub fn load_or_measure(
             }
             [&t.ground, &t.ground_stderr].into_iter().try_for_each(|p| put(&little(p.as_flattened())))
         },
-        || {
-            let crown = FieldCrown::new(bake, RESOLUTION, forest.view_iterations, forest.light_iterations);
-            measure(&crown, forest, quiet)
-        },
+        || measure_species(species()?, forest, quiet),
         quiet,
     )
 }
 
-/// BLAKE3 of everything that tables depend on.
-pub fn key(bake: &SpeciesBake, forest: &ForestSettings) -> [u8; 32] {
+/// BLAKE3 of everything that tables depend on: what the species is baked from, and how they are measured.
+pub fn key(source: &[u8; 32], forest: &ForestSettings) -> [u8; 32] {
     let ForestSettings {
         angles,
         densities,
@@ -69,27 +65,7 @@ pub fn key(bake: &SpeciesBake, forest: &ForestSettings) -> [u8; 32] {
     }
     fields.put(&pattern_density.to_le_bytes());
     fields.put(&little(&[scale_range[0], scale_range[1], hole_radius]));
-    let Crown {
-        frame: Frame { centre, half_width, half_height },
-        radius,
-        base,
-        height,
-        leaf_shadow,
-        extinction,
-    } = bake.crown;
-    let crown = [centre, half_width, half_height, radius, base, height, leaf_shadow, extinction];
-    fields.put(&little(&crown));
-    let leaf = LeafOptics::of(bake);
-    fields.put(&little(&[leaf.scattered[0], leaf.scattered[1], leaf.turning, leaf.albedo]));
-    fields.put(&bake.views.n.to_le_bytes());
-    fields.put(&bake.views.resolution.to_le_bytes());
-    // Only these levels are looked at.
-    for level in bake.views.levels.iter().skip(FieldCrown::level(bake, RESOLUTION)).take(2) {
-        fields.put(level);
-    }
-    for band in &bake.transfer.bands {
-        fields.put(&band[0]);
-    }
+    fields.put(source);
     fields.key()
 }
 

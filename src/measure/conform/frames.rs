@@ -30,12 +30,12 @@ fn renderer(
     let mut plan = Plan::for_eye(&scene, &eye, layers, rasterizer, Some(gpu.info()))?;
     plan.view_mode = case.mode;
     let exposure = auto_exposure(&scene);
-    let baked = bakes(&scene, options)?;
+    let baked = bakes(&scene, &plan, options)?;
     Ok((Renderer::new(gpu, Arc::new(scene), plan, &baked)?, camera, exposure))
 }
 
-fn bakes(scene: &Scene, options: &Options) -> Result<Vec<Baked>> {
-    let baked = load_or_bake_scene(scene, options.cache.as_deref(), true)?;
+fn bakes(scene: &Scene, plan: &Plan, options: &Options) -> Result<Vec<Baked>> {
+    let baked = load_or_bake_scene(scene, plan, options.cache.as_deref(), true)?;
     Ok(baked.into_iter().map(|(b, _)| b).collect())
 }
 
