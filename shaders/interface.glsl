@@ -26,6 +26,8 @@ const uint COVER_SCRATCH = 16u;       // coverage tiles of one scratch word a te
 const float FADE_FIRST = 0.9;         // part of its range at which the first of a species' trees has faded out
 const float FADE_SPREAD = 0.1;        // and how much later the last has, each at a time of its own
 const float FADE_RATE = 10.0;         // opacity that a tree loses per part of the range while it fades
+const float HANDOVER_FROM = 0.8;      // part of the range from which on the shader-map shows trees: where the first one begins to fade
+const float HANDOVER_RATE = 5.0;      // 1 over the width of the band, in which all of them fade
 
 // Everything of a frame that does not depend on the object drawn. World positions are relative to the camera. Bound as
 // a uniform block: arrays are of vec4 and mat4 only, so that std140 and std430 agree.
@@ -52,7 +54,7 @@ struct View {
     float hotspot_amplitude;          // a1 of BN12 eq. 8
     float hotspot_width;              // a2 of BN12 eq. 8, 1/rad
     float ground_contrast;            // a3 of BN12 eq. 10
-    float convergence;                // distance over the range from which light is the average, BN12 eq. 22-25
+    float convergence;                // distance over the range from which light is the average, BN12 eq. 22-25; 0: it never is
     float silhouette_ratio;           // range of trees on silhouettes over that of others: 1 without relief
     float silhouette_step;            // first distance from a tree at which its sight line is compared with the ground, m
     float height_cell;                // metres a texel of the height map
@@ -66,7 +68,7 @@ struct Species {
     vec3 reflectance;                 // of the crown's leaves and twigs, at phase angle 0
     float extinction;                 // tau of the crown's self-shadow, 1/(m rad)
     vec3 transmittance;               // of the crown's leaves
-    float range;                      // s_max: distance to which trees are drawn one by one, m
+    float range;                      // s_max: distance to which trees are drawn one by one, m; 0: none is
     float crown_radius;               // sqrt(A / pi), m
     float bounding_radius;            // of a sphere about o, m
     uint first_layer;                 // of its views in the z-field array

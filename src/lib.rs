@@ -52,6 +52,7 @@
 //! | the scene file | [`scene`] | | `tests/scene_inputs.rs`, `tests/model_inputs.rs` |
 //! | conformance of a driver | [`measure::conform`] | `probe/*` | `tests/conform.rs`, `tests/conformance/`, `tests/proofs/planted.rs` |
 //! | bakes on disk | [`bake::cache`], [`bake::tables`] | | `tests/cache.rs`, `tests/tables.rs` |
+//! | what stands for a tree at which distance | [`ladder`], [`physics::handover`] | `physics/handover.glsl` | `tests/gpu/plan.rs`, `tests/cli.rs` |
 //! | what a scene requires | [`plan`] | | `tests/gpu/plan.rs` |
 //! | the whole frame: extremes, paths through them, the same bits again | [`frame`] | `frame/*` | `tests/gpu/extremes.rs`, `tests/gpu/paths.rs`, `tests/gpu/determinism.rs` |
 //! | what few bits cost | | | `tests/proofs/precision.rs` |
@@ -78,6 +79,7 @@ pub mod forest;
 pub mod frame;
 pub mod gpu;
 pub mod image;
+pub mod ladder;
 pub mod land;
 pub mod measure;
 pub mod physics;

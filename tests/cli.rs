@@ -196,6 +196,52 @@ fn plan_lists_what_the_scene_needs_and_no_more() {
 }
 
 #[test]
+fn a_ladder_is_the_scenes_or_the_one_that_is_given() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = scene(dir.path(), &format!("{PATCHES}\n[quality]\nladder = \"zfield:8,shader-map\"\n"));
+    let ladder = |args: &[&str]| {
+        let plan = json(&[&["plan", &file, "--json"], args].concat());
+        (plan["plan"]["ladder"].as_str().unwrap().to_string(), plan["plan"]["range"].as_f64().unwrap())
+    };
+    let (own, range) = ladder(&[]);
+    assert_eq!(own, "zfield:8,shader-map");
+    // But for the last digit, which reading JSON rounds.
+    let is = |args: &[&str], text: &str, wanted: f64| {
+        let (printed, range) = ladder(args);
+        assert!(printed == text && (range - wanted).abs() <= 1e-12 * wanted, "{args:?}: {printed}, {range}");
+    };
+    // Half as high, twice as far; and where it does not say, the knob does.
+    is(&["--ladder", "zfield:4,shader-map"], "zfield:4,shader-map", 2.0 * range);
+    let knob = ["--set", "zfield_min_pixels=2"];
+    for asked in [["--ladder", "zfield,shader-map"], ["--representation", "auto"]] {
+        is(&[&asked[..], &knob].concat(), "zfield:2,shader-map", 4.0 * range);
+    }
+    // The scene's own height is no knob.
+    is(&knob, "zfield:8,shader-map", range);
+    for asked in ["--ladder", "--representation"] {
+        is(&[asked, "shader-map"], "shader-map", 0.0);
+        let (alone, far) = ladder(&[asked, "zfield"]);
+        // Not to infinity: as far as the scene needs.
+        assert!(alone == "zfield" && far > 500.0 && far < 2000.0, "{far}");
+    }
+    let quiet = ["--quiet", "--json"];
+    for command in ["render", "bench", "plan", "reflectance"] {
+        for (args, hint) in [
+            (&["--ladder", "mesh:256,zfield:4,shader-map"][..], "the rungs are: zfield, shader-map"),
+            (&["--ladder", "zfield:4"], "the last rung goes on to the horizon"),
+            (&["--ladder", "shader-map,zfield"], "near to far"),
+            (&["--ladder", "zfield,shader-map", "--representation", "auto"], "cannot be used with"),
+        ] {
+            let text = refused(2, &[&[command, &file], args, &quiet[..]].concat());
+            assert!(text.contains(hint), "{command} {args:?}: {text}");
+        }
+    }
+    let folder = dir.path().join("s").display().to_string();
+    let text = refused(2, &["sweep", &file, "-o", &folder, "--ladder", "shells"]);
+    assert!(text.contains("the rungs are: zfield, shader-map"), "{text}");
+}
+
+#[test]
 fn quality_goes_preset_then_scene_then_set() {
     let dir = tempfile::tempdir().unwrap();
     let text = "[terrain]\nextent = 100.0\n[[camera]]\nname = \"a\"\nposition = [0.0, 0.0, 2.0]\n\
@@ -214,7 +260,7 @@ fn quality_goes_preset_then_scene_then_set() {
 #[test]
 fn devices_and_trees() {
     let devices = json(&["devices", "--json"]);
-    assert_eq!(devices["schema_version"], 1);
+    assert_eq!(devices["schema_version"], 2);
     for key in ["name", "uuid", "kind", "driver", "api", "missing"] {
         assert!(!devices["devices"][0][key].is_null(), "{key}");
     }
@@ -294,7 +340,7 @@ fn the_same_image_twice_and_on_one_thread() {
     ] {
         assert!(!report[key].is_null(), "{key}");
     }
-    assert!(report["trees"]["by_representation"]["zfield"].as_u64().unwrap() > 0);
+    assert!(report["trees"]["by_rung"]["zfield"].as_u64().unwrap() > 0);
     assert!(report["passes"].as_array().unwrap().iter().all(|p| p["gpu_ms"].as_f64().unwrap() >= 0.0));
     assert!(report["memory"]["allocated_bytes"].as_u64() >= report["memory"]["planned_bytes"].as_u64());
 
@@ -450,6 +496,7 @@ fn reflectance_refuses_what_cannot_be_measured() {
         (&["--density", "0"], "--density"),
         (&["--density", "nan"], "--density"),
         (&["--representation", "mesh"], "shader-map"),
+        (&["--ladder", "mesh"], "the rungs are: zfield, shader-map"),
         (&["--patches", "0"], "--patches"),
         (&["--patch-side", "1000"], "--patch-side 1000"),
         (&["--patch-side", "nan"], "--patch-side"),

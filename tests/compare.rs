@@ -22,6 +22,7 @@ fn empty() -> BenchResult {
         size: [160, 120],
         settings: BTreeMap::from([("cascades".into(), 3.0)]),
         rasterizer: None,
+        ladder: None,
         timing: TimingIdentity { stamps: true, apart: true, pipeline_statistics: false },
         device: DeviceIdentity {
             name: "llvmpipe".into(),

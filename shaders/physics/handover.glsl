@@ -2,12 +2,15 @@
 // derived. `relative` is the distance over that at which a species is no longer drawn tree by tree (s / s_max).
 // Needs interface.glsl.
 
-// How far light and ground have converged to their averages: nu of BN12, eq. 22-25; `end` is 0.8 there.
-float converged(float relative, float end) { return smoothstep(0.0, end, relative); }
+// Distance over the range. Where there is none, everything is handed over: as at its end.
+float relative_distance(float distance, float range) { return range > 0.0 ? distance / range : 1.0; }
+
+// How far light and ground have converged to their averages: nu of BN12, eq. 22-25; `end` is 0.8 there, and 0 where they never do.
+float converged(float relative, float end) { return end > 0.0 ? smoothstep(0.0, end, relative) : 0.0; }
 
 // Share of the trees that the shader-map shows: mean of 1 - tree_fade over u.
 float handed_over(float relative) {
-    float t = clamp((relative - 0.8) * 5.0, 0.0, 1.0);
+    float t = clamp((relative - HANDOVER_FROM) * HANDOVER_RATE, 0.0, 1.0);
     return t < 0.5 ? 2.0 * t * t : 1.0 - 2.0 * (1.0 - t) * (1.0 - t);
 }
 

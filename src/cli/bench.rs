@@ -15,7 +15,9 @@ use canopy::scene::Scene;
 use canopy::settings::Settings;
 use canopy::{Error, Result};
 
-use super::options::{DeviceOptions, PrintOptions, RasterizerOptions, SceneOptions, assignment, knobs_help};
+use super::options::{
+    DeviceOptions, LadderOptions, PrintOptions, RasterizerOptions, SceneOptions, assignment, knobs_help,
+};
 use super::output::{self, Table};
 
 const EXAMPLES: &str = "\
@@ -56,6 +58,8 @@ pub struct Args {
     /// Measure a second setting in turn with the first (A B, B A, …), which differs in this knob; repeatable: several knobs
     #[arg(long, value_name = "KNOB=VALUE", value_parser = assignment)]
     against: Vec<(String, f64)>,
+    #[command(flatten)]
+    ladder: LadderOptions,
     #[command(flatten)]
     rasterizer: RasterizerOptions,
     /// Count vertices, primitives, fragments and invocations of each pass
@@ -227,7 +231,9 @@ fn text(r: &BenchResult) -> String {
         r.size[0],
         r.size[1],
         r.device.name,
-        r.rasterizer.as_ref().map_or(String::new(), |name| format!(", rasterizer {name}")),
+        [("ladder", &r.ladder), ("rasterizer", &r.rasterizer)]
+            .map(|(what, name)| name.as_ref().map_or(String::new(), |name| format!(", {what} {name}")))
+            .concat(),
         r.frames.len(),
         r.path.views
     );

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use canopy::gpu::{Gpu, GpuOptions, Validation};
-use canopy::plan::{Drawing, Rasterizer, Representation};
+use canopy::ladder::Ladder;
+use canopy::plan::{Drawing, Rasterizer};
 use canopy::reference::{self, Light, Until};
 use canopy::scene::{Camera, Scene};
 use canopy::settings::{KNOBS, PRESETS, Settings};
@@ -110,9 +111,28 @@ impl RasterizerOptions {
         self.choice.0
     }
 
-    /// Trees drawn as a representation.
-    pub fn drawing(self, representation: Representation) -> Drawing {
-        Drawing { representation, rasterizer: self.choice.0 }
+    /// Trees drawn by a ladder, or by the scene's.
+    pub fn drawing(self, ladder: Option<Ladder>) -> Drawing {
+        Drawing { ladder, rasterizer: self.choice.0 }
+    }
+}
+
+/// What stands for a tree.
+#[derive(clap::Args, Clone, Copy)]
+pub struct LadderOptions {
+    /// What stands for a tree, near to far: rungs, each with the apparent height of a tree in pixels down to which it is used, such
+    /// as zfield:4,shader-map; a height that is left out is zfield_min_pixels. Instead of the scene's [quality] ladder
+    #[arg(long, value_name = "RUNG:PIXELS,…,RUNG", value_parser = str::parse::<Ladder>, conflicts_with = "representation")]
+    ladder: Option<Ladder>,
+    /// Shorthand for a ladder: auto (zfield,shader-map), zfield or shader-map at any distance
+    #[arg(long, value_name = "NAME", value_parser = named(Ladder::SHORTHANDS))]
+    representation: Option<Ladder>,
+}
+
+impl LadderOptions {
+    /// Gives a scene the ladder that was chosen, if one was.
+    pub fn set(self, scene: &mut Scene) {
+        scene.ladder = self.ladder.or(self.representation).unwrap_or(scene.ladder);
     }
 }
 
@@ -135,10 +155,10 @@ pub fn named<T: Copy + Send + Sync + 'static, const N: usize>(
 }
 
 /// What draws: the renderer in one of its ways, or the Monte-Carlo reference.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drawn {
     /// The renderer, on a Vulkan device.
-    By(Representation),
+    By(Ladder),
     /// The reference, on the CPU.
     Reference,
 }
@@ -146,15 +166,15 @@ pub enum Drawn {
 impl Drawn {
     /// All, with the names that users write.
     pub fn names() -> [(&'static str, Drawn); 4] {
-        let [a, b, c] = Representation::NAMES.map(|(name, r)| (name, Drawn::By(r)));
+        let [a, b, c] = Ladder::SHORTHANDS.map(|(name, r)| (name, Drawn::By(r)));
         [a, b, c, ("reference", Drawn::Reference)]
     }
 
     /// The name that users write.
-    pub fn name(self) -> &'static str {
+    pub fn name(self) -> String {
         match self {
-            Drawn::By(r) => r.name(),
-            Drawn::Reference => "reference",
+            Drawn::By(ladder) => ladder.name(),
+            Drawn::Reference => "reference".into(),
         }
     }
 }

@@ -2,18 +2,19 @@
 
 use canopy::camera::Eye;
 use canopy::gpu::DeviceInfo;
-use canopy::plan::{Plan, Representation};
+use canopy::plan::Plan;
 use canopy::settings::Settings;
 use canopy::{Error, Result};
 
 use super::SCHEMA_VERSION;
-use super::options::{PrintOptions, RasterizerOptions, SceneOptions, knobs_help};
+use super::options::{LadderOptions, PrintOptions, RasterizerOptions, SceneOptions, knobs_help};
 use super::output::{self, Table};
 
 const EXAMPLES: &str = "\
 Examples:
   canopy plan                               what the built-in scene takes
   canopy plan my.toml --quality accurate    the same, for yours, at another preset
+  canopy plan --ladder shader-map           what it takes without any tree drawn by itself
   canopy plan --layers --size 3840x2160     with what an EXR needs, in 4K
 Without a Vulkan device the plan is made for common limits, and says so.";
 
@@ -25,6 +26,8 @@ pub struct Args {
     /// Plan for an EXR too: layers apart
     #[arg(long)]
     layers: bool,
+    #[command(flatten)]
+    ladder: LadderOptions,
     #[command(flatten)]
     rasterizer: RasterizerOptions,
     /// Device by UUID or part of its name; left out: the best that fits
@@ -47,7 +50,8 @@ struct Report<'a> {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    let (scene, camera) = args.scene.load()?;
+    let (mut scene, camera) = args.scene.load()?;
+    args.ladder.set(&mut scene);
     let device = match canopy::gpu::find(args.device.as_deref()) {
         Ok(info) => Some(info),
         // Nothing is drawn here; only who names a device means that one.
@@ -55,7 +59,7 @@ pub fn run(args: &Args) -> Result<()> {
         Err(e) => return Err(e),
     };
     let eye = Eye::new(&camera, &scene.terrain, args.scene.size);
-    let drawing = args.rasterizer.drawing(Representation::Auto);
+    let drawing = args.rasterizer.drawing(None);
     let plan = Plan::for_eye(&scene, &eye, args.layers, drawing, device.as_ref())?;
     if args.print.json {
         return output::json(&Report {
@@ -78,16 +82,17 @@ pub fn run(args: &Args) -> Result<()> {
     };
     let mut table = Table::new(3, &["kind", "name", "reason", "bytes"]);
     for i in &plan.items {
-        let bytes = if i.bytes > 0 { output::bytes(i.bytes) } else { "-".into() };
+        let bytes = if i.bytes() > 0 { output::bytes(i.bytes()) } else { "-".into() };
         table.row([i.kind.into(), i.name.clone(), i.reason.clone(), bytes]);
     }
     table.row(["".into(), "total".into(), "device memory".into(), output::bytes(plan.bytes())]);
     output::print(&format!(
-        "{}, camera {}, {} x {}, rasterizer {} ({whose})\n{}",
+        "{}, camera {}, {} x {}, ladder {}, rasterizer {} ({whose})\n{}",
         scene.name,
         camera.name,
         plan.size[0],
         plan.size[1],
+        plan.ladder,
         plan.rasterizer.name(),
         table.text()
     ))

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use canopy::bake::{Baked, cache, load_or_bake_scene};
 use canopy::gpu::Gpu;
+use canopy::ladder::Ladder;
 use canopy::measure::reflectance::{Measured, Method, Request, mean_densities, measure, measure_reference};
 use canopy::progress::Progress;
 use canopy::reference::Until;
@@ -23,6 +24,7 @@ Examples:
   canopy reflectance scene.toml --sun-zenith 45 --view-zenith -75:75:5 --azimuth 0 \\
          --distance 50,200,1000,20000 --representation auto --out brf.csv
   canopy reflectance scene.toml --representation zfield,shader-map --distance 100,400
+  canopy reflectance scene.toml --ladder zfield:8,shader-map --ladder zfield:2,shader-map --distance 200,400
   canopy reflectance scene.toml --density 0.01 --slope -20,0,20 --json
   canopy reflectance scene.toml --representation zfield,reference --bounces 1 --until 1%
       the renderer against path tracing of the real trees, both with light that met one surface
@@ -83,8 +85,11 @@ pub struct Args {
     /// Inclinations of the ground, degrees
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = list)]
     slope: List,
-    /// How trees are drawn: auto, zfield, shader-map, or reference (path tracing on the CPU); several with commas between
-    #[arg(long, value_name = "NAMES", default_value = "auto", value_delimiter = ',', value_parser = named(Drawn::names()))]
+    /// What stands for a tree, near to far, such as zfield:4,shader-map (see canopy render); repeatable. Left out: the scene's
+    #[arg(long, value_name = "RUNG:PIXELS,…,RUNG", value_parser = str::parse::<Ladder>, conflicts_with = "representation")]
+    ladder: Vec<Ladder>,
+    /// Shorthands for ladders: auto, zfield, shader-map; or reference (path tracing on the CPU); several with commas between
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = named(Drawn::names()))]
     representation: Vec<Drawn>,
     #[command(flatten)]
     rasterizer: RasterizerOptions,
@@ -118,7 +123,7 @@ struct List(Vec<f64>);
 /// A row of the CSV.
 #[derive(serde::Serialize)]
 struct Row {
-    representation: &'static str,
+    representation: String,
     distance_m: f64,
     sun_zenith_deg: f64,
     slope_deg: f64,
@@ -211,18 +216,25 @@ struct Setting {
     views: Vec<[f64; 2]>,
 }
 
-/// All rows, in the order of representations, suns, slopes and distances.
+/// What is measured: the ladders or representations asked for, else the scene's ladder.
+fn drawn(args: &Args, scene: &Scene) -> Vec<Drawn> {
+    let asked = args.ladder.iter().map(|l| Drawn::By(*l)).chain(args.representation.iter().copied());
+    let asked: Vec<Drawn> = asked.collect();
+    if asked.is_empty() { vec![Drawn::By(scene.ladder)] } else { asked }
+}
+
+/// All rows, in the order of ladders and representations, suns, slopes and distances.
 fn all(args: &Args, scene: &Scene, camera: &Camera, densities: &[f64]) -> Result<Vec<Row>> {
     let method = Method { patches: args.patches, side: args.patch_side, pixels: args.patch_pixels };
     let suns = args.sun_zenith.clone().unwrap_or(List(vec![90.0 - scene.sun.elevation]));
     let all_views: Vec<[f64; 2]> =
         args.azimuth.0.iter().flat_map(|a| args.view_zenith.0.iter().map(|v| [*v, *a])).collect();
     let mut settings = Vec::new();
-    for drawn in &args.representation {
+    for drawn in drawn(args, scene) {
         for (sun_zenith, slope) in suns.0.iter().flat_map(|s| args.slope.0.iter().map(|p| (*s, *p))) {
             // Ground that turns its back shows nothing.
             let views = all_views.iter().copied().filter(|v| sees(*v, slope)).collect();
-            settings.push(Setting { drawn: *drawn, sun_zenith, slope, views });
+            settings.push(Setting { drawn, sun_zenith, slope, views });
         }
     }
     let distances = args.distance.0.len() as u64;
@@ -253,10 +265,10 @@ fn all(args: &Args, scene: &Scene, camera: &Camera, densities: &[f64]) -> Result
                 }));
             };
             match (s.drawn, gpu) {
-                (Drawn::By(representation), Some(gpu)) => {
+                (Drawn::By(ladder), Some(gpu)) => {
                     for &distance in &args.distance.0 {
                         let (sun_zenith, slope, views) = (s.sun_zenith, s.slope, s.views.clone());
-                        let drawing = args.rasterizer.drawing(representation);
+                        let drawing = args.rasterizer.drawing(Some(ladder));
                         let r = Request { sun_zenith, slope, distance, drawing, views };
                         let from = (camera, size);
                         let mut step = || progress.step(1);
@@ -285,6 +297,11 @@ fn sees([zenith, azimuth]: [f64; 2], slope: f64) -> bool {
     z.sin() * a.cos() * s.sin() + z.cos() * s.cos() > 5f64.to_radians().sin()
 }
 
+/// A field of a CSV row: quoted where it has commas of its own.
+fn quoted(field: &str) -> String {
+    if field.contains(',') { format!("\"{field}\"") } else { field.into() }
+}
+
 fn csv(rows: &[Row]) -> String {
     let mut text = COLUMNS.join(",") + "\n";
     for r in rows {
@@ -292,7 +309,7 @@ fn csv(rows: &[Row]) -> String {
         let angles = [r.distance_m, r.sun_zenith_deg, m.view[0], m.view[1], r.slope_deg];
         let values = angles.into_iter().map(|v| v.to_string());
         let measured = [&m.fractions[..], &m.radiance(), &m.sun, &m.sky, &m.stderr].concat();
-        let all: Vec<String> = std::iter::once(r.representation.to_string())
+        let all: Vec<String> = std::iter::once(quoted(&r.representation))
             .chain(values)
             .chain(measured.iter().map(|v| format!("{v:.7}")))
             .collect();

@@ -1,5 +1,6 @@
 //! `canopy render`.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -8,9 +9,10 @@ use canopy::bake::{Baked, cache, load_or_bake_scene};
 use canopy::camera::{Eye, auto_exposure};
 use canopy::frame::{FrameReport, Renderer};
 use canopy::gpu::{DeviceInfo, FrameCapture, Gpu, PassTime, Stamps, TimingOptions};
+use canopy::ladder::{Ladder, Rung};
 use canopy::measure::results::SceneIdentity;
 use canopy::measure::sweep::kept::{self, Choice, Subject};
-use canopy::plan::{Plan, Representation, ViewMode};
+use canopy::plan::{Plan, ViewMode};
 use canopy::progress::Progress;
 use canopy::scene::{Camera, Scene};
 use canopy::settings::Settings;
@@ -62,9 +64,13 @@ pub struct Args {
     /// Sweep that --budget takes the setting from; left out: the last one of this scene, size and device
     #[arg(long, value_name = "FILE.json", requires = "budget")]
     sweep: Option<PathBuf>,
-    /// How trees are drawn: auto, zfield or shader-map at any distance, or reference: path tracing on the CPU
-    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = named(Drawn::names()))]
-    representation: Drawn,
+    /// What stands for a tree, near to far: rungs, each with the apparent height of a tree in pixels down to which it is used, such
+    /// as zfield:4,shader-map; a height that is left out is zfield_min_pixels. Instead of the scene's [quality] ladder
+    #[arg(long, value_name = "RUNG:PIXELS,…,RUNG", value_parser = str::parse::<Ladder>, conflicts_with = "representation")]
+    ladder: Option<Ladder>,
+    /// Shorthand for a ladder: auto (zfield,shader-map), zfield or shader-map at any distance; or reference: path tracing on the CPU
+    #[arg(long, value_name = "NAME", value_parser = named(Drawn::names()))]
+    representation: Option<Drawn>,
     #[command(flatten)]
     rasterizer: RasterizerOptions,
     #[command(flatten)]
@@ -97,16 +103,11 @@ struct SceneReport<'a> {
     exposure: f64,
 }
 
-/// Trees in view, by what draws them.
-#[derive(serde::Serialize)]
-struct Representations {
-    zfield: u32,
-}
-
 #[derive(serde::Serialize)]
 struct Trees<'a> {
     in_view: u32,
-    by_representation: Representations,
+    /// By the rung that draws them one by one.
+    by_rung: BTreeMap<&'static str, u32>,
     casters_by_cascade: &'a [u32],
 }
 
@@ -186,19 +187,15 @@ pub fn run(args: &Args) -> Result<()> {
     if let Some(exr) = &args.exr {
         output::check(exr, "exr")?;
     }
-    let representation = match args.representation {
-        Drawn::By(representation) => {
-            args.reference.refuse()?;
-            if args.resume.is_some() {
-                return Err(Error::Usage("--resume is for --representation reference".into()));
-            }
-            Some(representation)
+    let traced = args.representation == Some(Drawn::Reference);
+    if traced {
+        refuse_for_reference(args)?;
+    } else {
+        args.reference.refuse()?;
+        if args.resume.is_some() {
+            return Err(Error::Usage("--resume is for --representation reference".into()));
         }
-        Drawn::Reference => {
-            refuse_for_reference(args)?;
-            None
-        }
-    };
+    }
     let capture = args.capture_frame.map(|n| match n <= args.frames {
         true => FrameCapture::attached(),
         false => {
@@ -208,7 +205,7 @@ pub fn run(args: &Args) -> Result<()> {
     let capture = capture.transpose()?;
     let (quiet, start) = (args.print.quiet, Instant::now());
     let loading = Progress::new("loading", 1, quiet);
-    let (scene, camera) = args.scene.load()?;
+    let (mut scene, camera) = args.scene.load()?;
     loading.finish();
     let png = args.output.clone().unwrap_or_else(|| match args.scene.scene {
         Some(_) => format!("{}.png", scene.name).into(),
@@ -216,7 +213,7 @@ pub fn run(args: &Args) -> Result<()> {
     });
     output::check(&png, "png")?;
     let load_s = start.elapsed().as_secs_f64();
-    let Some(representation) = representation else {
+    if traced {
         return reference::render(reference::Request {
             scene: &scene,
             camera: &camera,
@@ -229,8 +226,11 @@ pub fn run(args: &Args) -> Result<()> {
             load_s,
             print: args.print,
         });
-    };
-    args.device.with(|gpu| draw(args, gpu, scene, &camera, representation, png, load_s, capture))
+    }
+    if let Some(Drawn::By(ladder)) = args.ladder.map(Drawn::By).or(args.representation) {
+        scene.ladder = ladder;
+    }
+    args.device.with(|gpu| draw(args, gpu, scene, &camera, png, load_s, capture))
 }
 
 /// Refuses what only the renderer does.
@@ -265,7 +265,6 @@ fn draw(
     gpu: &Gpu,
     mut scene: Scene,
     camera: &Camera,
-    representation: Representation,
     png: PathBuf,
     load_s: f64,
     mut capture: Option<FrameCapture>,
@@ -276,7 +275,7 @@ fn draw(
         scene.settings = choice.settings.clone();
     }
     let eye = Eye::new(camera, &scene.terrain, args.scene.size);
-    let drawing = args.rasterizer.drawing(representation);
+    let drawing = args.rasterizer.drawing(None);
     let mut plan = Plan::for_eye(&scene, &eye, args.exr.is_some(), drawing, Some(gpu.info()))?;
     plan.view_mode = args.view_mode;
     let scene = Arc::new(scene);
@@ -374,6 +373,7 @@ fn choose(args: &Args, gpu: &Gpu, scene: &Scene, time: Duration) -> Result<Choic
         size: args.scene.size,
         device: gpu.info().into(),
         rasterizer: args.rasterizer.chosen().map(|r| r.name().into()),
+        ladder: kept::unusual(&scene.ladder),
     };
     let file = match &args.sweep {
         Some(file) => file.clone(),
@@ -397,7 +397,7 @@ fn choose(args: &Args, gpu: &Gpu, scene: &Scene, time: Duration) -> Result<Choic
 fn trees(frame: &FrameReport) -> Trees<'_> {
     Trees {
         in_view: frame.trees.camera,
-        by_representation: Representations { zfield: frame.trees.camera },
+        by_rung: BTreeMap::from([(Rung::ZField.name(), frame.trees.camera)]),
         casters_by_cascade: &frame.trees.cascades,
     }
 }
@@ -432,7 +432,10 @@ fn text(r: &Report) -> String {
 
     let mut drawn = Table::new(1, &["drawn", ""]);
     drawn.row(["rasterizer".into(), r.plan.rasterizer.name().into()]);
-    drawn.row(["trees as z-fields".into(), r.trees.by_representation.zfield.to_string()]);
+    drawn.row(["ladder".into(), r.plan.ladder.to_string()]);
+    for (rung, n) in &r.trees.by_rung {
+        drawn.row([format!("trees as {rung}"), n.to_string()]);
+    }
     for (k, n) in r.trees.casters_by_cascade.iter().enumerate() {
         drawn.row([format!("trees in cascade {k}"), n.to_string()]);
     }
@@ -441,8 +444,8 @@ fn text(r: &Report) -> String {
     text += &format!("\n{}", drawn.text());
 
     let mut memory = Table::new(1, &["device memory", ""]);
-    for i in r.plan.items.iter().filter(|i| i.bytes > 0) {
-        memory.row([i.name.clone(), output::bytes(i.bytes)]);
+    for i in r.plan.items.iter().filter(|i| i.bytes() > 0) {
+        memory.row([i.name.clone(), output::bytes(i.bytes())]);
     }
     memory.row(["planned".into(), output::bytes(r.memory.planned_bytes)]);
     memory.row(["allocated".into(), output::bytes(r.memory.allocated_bytes)]);

@@ -16,7 +16,7 @@ use canopy::scene::Camera;
 use canopy::settings::{KNOBS, PRESETS};
 use canopy::{Error, Result};
 
-use super::options::{self, Bounces, DeviceOptions, Goal, PrintOptions, RasterizerOptions};
+use super::options::{self, Bounces, DeviceOptions, Goal, LadderOptions, PrintOptions, RasterizerOptions};
 use super::output::{self, Table};
 
 const EXAMPLES: &str = "\
@@ -85,6 +85,8 @@ pub struct Args {
     #[arg(long, conflicts_with = "json")]
     markdown: bool,
     #[command(flatten)]
+    ladder: LadderOptions,
+    #[command(flatten)]
     rasterizer: RasterizerOptions,
     #[command(flatten)]
     device: DeviceOptions,
@@ -99,7 +101,8 @@ pub fn run(args: &Args) -> Result<()> {
         args.set.iter().try_for_each(|(name, value)| settings.set(name, *value))?;
         presets.insert(preset.to_string(), settings);
     }
-    let scene = canopy::scene::load_at(args.scene.as_deref(), None)?;
+    let mut scene = canopy::scene::load_at(args.scene.as_deref(), None)?;
+    args.ladder.set(&mut scene);
     let cameras: Vec<Camera> = match &args.cameras[..] {
         [] => scene.cameras.clone(),
         names => names.iter().map(|n| scene.camera(Some(n)).cloned()).collect::<Result<_>>()?,

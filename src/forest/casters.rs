@@ -11,11 +11,12 @@ use super::species::SpeciesData;
 use crate::camera::cascades::Cascade;
 use crate::frame::pages::{Block, PageSet};
 use crate::gpu::interface::{
-    CULL_GROUP, Caster, CasterParameters, CasterQuad, DrawCommand, Seed, SeedQuad, ShadowBlock, Species,
+    CULL_GROUP, CasterParameters, CasterQuad, DrawCommand, Seed, SeedQuad, ShadowBlock, Species,
 };
 use crate::gpu::{Buffer, Gpu, Later, Layers, Program, Recorder, Resource, shaders};
 use crate::land::quadtree::{Quadtree, grid_cells};
 use crate::plan::Plan;
+use crate::plan::names::{pass, resource};
 use crate::scene::Scene;
 use crate::{Error, Result};
 
@@ -102,7 +103,7 @@ impl CasterData {
             ("VIEW_RESOLUTION", (scene.settings.view_resolution as f32).to_bits()),
         ];
         Ok(CasterData {
-            casters: gpu.buffer("casters", u64::from(plan.caster_capacity) * size_of::<Caster>() as u64)?,
+            casters: gpu.described_buffer(&plan.buffer(resource::CASTERS))?,
             commands: gpu.buffer("caster draws", 64 * size_of::<DrawCommand>() as u64)?,
             work: CasterWork::default(),
             quads: gpu.buffer("caster quads", 4096 * size_of::<CasterQuad>() as u64)?,
@@ -189,7 +190,7 @@ impl CasterData {
         batch: usize,
     ) {
         let work = &self.work;
-        recorder.compute("casters", |pass| {
+        recorder.compute(pass::CASTERS, |pass| {
             let Some(b) = work.batches.get(batch) else { return };
             pass.bind(
                 &self.program,

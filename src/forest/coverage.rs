@@ -18,13 +18,14 @@ use super::species::SpeciesData;
 use super::terrain::{TerrainData, TerrainDraws};
 use crate::Result;
 use crate::gpu::interface::{
-    COVER_GUTTER, COVER_LEVELS, COVER_SCRATCH, CoverageParameters, CoverageSplat, CoverageTile,
-    SeedParameters, SeedQuad, TERRAIN_CELLS,
+    COVER_GUTTER, COVER_SCRATCH, CoverageParameters, CoverageSplat, CoverageTile, SeedParameters, SeedQuad,
+    TERRAIN_CELLS,
 };
-use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Program, Recorder, Resource, Sampler, shaders, vk};
+use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Program, Recorder, Resource, Sampler, shaders};
 use crate::land::density::density_map_size;
 use crate::land::quadtree::{QuadKey, Quadtree};
 use crate::plan::Plan;
+use crate::plan::names::{pass, resource};
 use crate::scene::{Distribution, Scene};
 
 /// Texels finer than this are needless, m.
@@ -40,11 +41,6 @@ const LEAST_RADIUS: f64 = 0.75;
 const MOST_GROUPS: u32 = 32768;
 /// Texels of a workgroup's region.
 const REGION: [u32; 2] = [32, 16];
-
-/// Format of tiles of so many channels.
-pub fn format(channels: u32) -> vk::Format {
-    if channels == 2 { vk::Format::R16G16_SFLOAT } else { vk::Format::R16G16B16A16_SFLOAT }
-}
 
 /// Both push constants of the production.
 #[repr(C)]
@@ -132,20 +128,12 @@ impl CoverageData {
         let finest = (0..tree.levels()).rev().find(|l| tree.side(*l) / inner >= least).unwrap_or(0);
         let of_discs = [("COVER_SIDE", size), ("DENSITY_MAPS", species.map_count)];
         let of_tiles = [&of_discs[..], &[("SPECIES_COUNT", scene.species.len() as u32)]].concat();
-        let texels = u64::from(size) * u64::from(size);
         // Zeros, as the production leaves them.
-        let sums =
-            gpu.buffer_with("coverage sums", &vec![0u32; (u64::from(COVER_SCRATCH) * texels) as usize])?;
+        let sums = plan.buffer(resource::COVERAGE_SUMS);
+        let sums = gpu.described_buffer_with(&sums, &vec![0u32; (sums.bytes / 4) as usize])?;
+        let none = ImageDesc::stand_in(resource::COVERAGE, plan.cover_format());
         Ok(CoverageData {
-            tiles: gpu.image(&ImageDesc {
-                name: "coverage tiles",
-                format: format(plan.cover_channels),
-                size: [size; 2],
-                layers: plan.cover_slots * plan.cover_layers(),
-                levels: COVER_LEVELS,
-                samples: 1,
-                usage: vk::ImageUsageFlags::STORAGE,
-            })?,
+            tiles: gpu.image(plan.images(resource::COVERAGE).next().unwrap_or(&none))?,
             groups: plan.cover_layers(),
             cache: SlotCache::new(plan.cover_slots),
             sums,
@@ -325,7 +313,7 @@ impl CoverageData {
             return;
         }
         let [across, down] = REGION.map(|n| self.tiles.size()[0] / n);
-        recorder.compute("coverage tiles", |pass| {
+        recorder.compute(pass::COVERAGE, |pass| {
             let push = |first_tile, first_splat| Push {
                 seeds: seeds.parameters,
                 coverage: CoverageParameters {

@@ -10,14 +10,15 @@ use super::tables::TableData;
 use super::terrain::TerrainData;
 use crate::gpu::interface::{
     CAMERA_DRAWS, CULL_GROUP, CullParameters, DISTANCE_BINS, DrawCommand, FADE_FIRST, FADE_RATE, FADE_SPREAD,
-    Seed, SeedQuad, Species, TREE_LISTS, Tree, View,
+    Seed, SeedQuad, Species, TREE_LISTS, View,
 };
-use crate::gpu::{Buffer, Gpu, Later, Program, Recorder, Resource, Sampler, shaders, vk};
+use crate::gpu::{Buffer, Gpu, Later, Program, Recorder, Resource, Sampler, shaders};
 use crate::land::silhouette::clearance;
 use crate::physics::handover;
 use crate::physics::hash::{HASH_FADE, hash, unit};
 use crate::physics::raster::Raster;
 use crate::plan::Plan;
+use crate::plan::names::{pass, resource};
 use crate::scene::Scene;
 use crate::{Error, Result};
 
@@ -67,9 +68,6 @@ impl CullData {
     /// # Errors
     /// [`Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, tables: &TableData) -> Result<Self> {
-        let slots = u64::from(plan.seed_regions) * u64::from(plan.region_capacity);
-        let groups = slots / u64::from(CULL_GROUP);
-        let trees = u64::from(plan.tree_capacity);
         let float = |n: u32| (n as f32).to_bits();
         let constants = [
             ("VIEW_RINGS", scene.settings.view_rings),
@@ -79,16 +77,12 @@ impl CullData {
             ("PAIR_TABLES", u32::from(plan.pair_tables)),
         ];
         Ok(CullData {
-            trees: gpu.texel_buffer(
-                "trees",
-                trees * size_of::<Tree>() as u64,
-                (vk::Format::R32G32B32A32_UINT, 16),
-            )?,
-            lists: gpu.buffer("tree lists", trees * 4)?,
+            trees: gpu.described_buffer(&plan.buffer(resource::TREES))?,
+            lists: gpu.described_buffer(&plan.buffer(resource::TREE_LISTS))?,
             commands: gpu.buffer("tree draws", u64::from(CAMERA_DRAWS) * size_of::<DrawCommand>() as u64)?,
             totals: gpu.buffer("tree totals", 4 * u64::from(TREE_LISTS))?,
-            classes: gpu.buffer("seed classes", slots * 4)?,
-            counts: gpu.buffer("list counts", groups * 4 * u64::from(TREE_LISTS))?,
+            classes: gpu.described_buffer(&plan.buffer(resource::SEED_CLASSES))?,
+            counts: gpu.described_buffer(&plan.buffer(resource::LIST_COUNTS))?,
             starts: gpu.buffer("list starts", 4 * u64::from(TREE_LISTS))?,
             programs: [
                 gpu.compute(&shaders::FOREST_CULL_COMP, &[])?,
@@ -146,10 +140,10 @@ impl CullData {
         ];
         let groups = [parameters.group_count, 1, 1];
         for (name, program, size) in [
-            ("cull", 0, groups),
-            ("prefix sums", 1, [1, 1, 1]),
-            ("draw commands", 2, [1, 1, 1]),
-            ("compact", 3, groups),
+            (pass::CULL, 0, groups),
+            (pass::SUMS, 1, [1, 1, 1]),
+            (pass::COMMANDS, 2, [1, 1, 1]),
+            (pass::COMPACT, 3, groups),
         ] {
             recorder.compute(name, |pass| {
                 pass.bind(&self.programs[program], &shared);

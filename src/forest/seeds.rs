@@ -4,13 +4,14 @@ use super::cache::SlotCache;
 use super::species::SpeciesData;
 use super::terrain::TerrainData;
 use crate::camera::Eye;
-use crate::gpu::interface::{DrawCommand, Seed, SeedParameters, SeedQuad};
+use crate::gpu::interface::{DrawCommand, SeedParameters, SeedQuad};
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
 use crate::land::density::density_map_size;
 use crate::land::listed::{ListedRanges, bin_listed};
 use crate::land::quadtree::{Bounds, Quadtree};
 use crate::land::silhouette::{Belt, Ground, silhouette_quads};
-use crate::plan::Plan;
+use crate::plan::names::{pass, resource};
+use crate::plan::{Plan, QUAD_INDEX_BYTES};
 use crate::scene::{Scene, Species};
 use crate::{Error, Result};
 
@@ -63,10 +64,9 @@ impl SeedData {
     /// # Errors
     /// [`Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
-        let slots = u64::from(plan.seed_regions) * u64::from(plan.region_capacity);
         let (listed, listed_ranges) = bin_listed(scene, plan.quad_side);
-        let drawn = plan.tree_capacity.max(plan.region_capacity).max(plan.caster_capacity);
-        let indices: Vec<u32> = (0..if plan.z_fields { drawn } else { 0 })
+        let quad_indices = plan.buffer(resource::QUAD_INDICES);
+        let indices: Vec<u32> = (0..(quad_indices.bytes / QUAD_INDEX_BYTES) as u32)
             .flat_map(|k| [0, 1, 2, 2, 1, 3].map(|c| 4 * k + c))
             .collect();
         let pattern = plan.pattern.as_ref().map_or_else(Vec::new, |p| p.packed());
@@ -74,7 +74,7 @@ impl SeedData {
         let mapped = |s: &&Species| density_map_size(s, scene.terrain.extent).is_some();
         let maps = scene.species.iter().filter(mapped).count() as u32;
         Ok(SeedData {
-            seeds: gpu.buffer("seeds", slots * size_of::<Seed>() as u64)?,
+            seeds: gpu.described_buffer(&plan.buffer(resource::SEEDS))?,
             draws: gpu
                 .buffer("seed draws", u64::from(plan.seed_regions) * size_of::<DrawCommand>() as u64)?,
             quads: gpu
@@ -82,8 +82,8 @@ impl SeedData {
             visible_quads: Vec::new(),
             visible: 0,
             region_capacity: plan.region_capacity,
-            quad_indices: gpu.buffer_with("quad indices", &indices)?,
-            pattern: gpu.buffer_with("point pattern", &pattern)?,
+            quad_indices: gpu.described_buffer_with(&quad_indices, &indices)?,
+            pattern: gpu.described_buffer_with(&plan.buffer(resource::PATTERN), &pattern)?,
             listed: gpu.buffer_with("listed trees", &listed)?,
             species_count: gpu.buffer_with("species count", &[scene.species.len() as u32])?,
             listed_ranges,
@@ -293,7 +293,7 @@ impl SeedData {
         if fresh.iter().all(|(_, (_, count))| *count == 0) {
             return;
         }
-        recorder.compute("seeds", |pass| {
+        recorder.compute(pass::SEEDS, |pass| {
             for (quads, (first, count)) in fresh {
                 pass.bind(
                     &self.program,

@@ -10,6 +10,7 @@ use crate::physics::transfer::NEUTRAL;
 use crate::physics::views;
 use crate::physics::zfield::ZField;
 use crate::plan::Plan;
+use crate::plan::names::resource;
 use crate::scene::{Distribution, Scene, Species, TreePosition};
 use crate::{Error, Result};
 
@@ -46,17 +47,8 @@ impl SpeciesData {
         let n = scene.settings.view_rings;
         let view_count = views::count(n);
         let resolution = scene.settings.view_resolution;
-        // One texel stands for views that nobody reads.
-        let side = if plan.z_fields { resolution } else { 1 };
-        let texels = gpu.image(&ImageDesc {
-            name: "z-field views",
-            format: vk::Format::R8G8B8A8_UNORM,
-            size: [side; 2],
-            layers: if plan.z_fields { view_count * baked.len() as u32 } else { 1 },
-            levels: side.ilog2() + 1,
-            samples: 1,
-            usage: vk::ImageUsageFlags::empty(),
-        })?;
+        let none = ImageDesc::stand_in(resource::VIEWS, vk::Format::R8G8B8A8_UNORM);
+        let texels = gpu.image(plan.images(resource::VIEWS).next().unwrap_or(&none))?;
         for (k, bake) in baked.iter().map(|b| &b.species).enumerate() {
             if bake.views.resolution != resolution || bake.views.n != n {
                 return Err(Error::Usage("a species was baked with other settings than the scene's".into()));
@@ -72,16 +64,9 @@ impl SpeciesData {
         let rows = rows(scene, plan, baked, &maps, view_count);
         let maps: Vec<&Raster> = maps.iter().flatten().map(|m| m.relative.as_ref()).collect();
         let map_count = maps.len() as u32;
-        let size = maps.iter().fold([1, 1], |s: [u32; 2], m| [s[0].max(m.width), s[1].max(m.height)]);
-        let densities = gpu.image(&ImageDesc {
-            name: "density maps",
-            format: vk::Format::R32_SFLOAT,
-            size,
-            layers: map_count.max(1),
-            levels: 1,
-            samples: 1,
-            usage: vk::ImageUsageFlags::empty(),
-        })?;
+        let none = ImageDesc::stand_in(resource::DENSITY_MAPS, vk::Format::R32_SFLOAT);
+        let densities = gpu.image(plan.images(resource::DENSITY_MAPS).next().unwrap_or(&none))?;
+        let size = densities.size();
         for (layer, map) in maps.iter().enumerate() {
             let mut padded = vec![0f32; (size[0] * size[1]) as usize];
             for y in 0..map.height as usize {
@@ -144,24 +129,15 @@ fn block(rows: &[Row]) -> Vec<Row> {
 
 /// Uploads a band of the light transfer of all species.
 fn transfer(gpu: &Gpu, plan: &Plan, baked: &[Baked], band: u32) -> Result<Image> {
-    let used = band < plan.transfer_bands;
-    let first = &baked[0].species;
-    let view_count = views::count(first.views.n);
-    let side = if used { first.transfer.resolution } else { 1 };
-    let image = gpu.image(&ImageDesc {
-        name: "light transfer",
-        format: vk::Format::R8G8B8A8_UNORM,
-        size: [side; 2],
-        layers: if used { view_count * baked.len() as u32 } else { 1 },
-        levels: side.ilog2() + 1,
-        samples: 1,
-        usage: vk::ImageUsageFlags::empty(),
-    })?;
-    if !used {
+    let Some(described) = plan.images(resource::TRANSFER).nth(band as usize) else {
+        let none = ImageDesc::stand_in(resource::TRANSFER, vk::Format::R8G8B8A8_UNORM);
+        let image = gpu.image(&none)?;
         gpu.upload_image(&image, 0, 0, 1, &NEUTRAL)?;
         return Ok(image);
-    }
+    };
+    let image = gpu.image(described)?;
     for (k, bake) in baked.iter().map(|b| &b.species).enumerate() {
+        let view_count = views::count(bake.views.n);
         for (level, bytes) in bake.transfer.bands[band as usize].iter().enumerate() {
             gpu.upload_image(&image, level as u32, k as u32 * view_count, view_count, bytes)?;
         }

@@ -3,8 +3,9 @@
 
 use half::f16;
 
-use crate::gpu::{Gpu, Image, ImageDesc, vk};
+use crate::gpu::{Gpu, Image, ImageDesc, VolumeDesc};
 use crate::physics::tables::ForestTables;
+use crate::plan::names::resource;
 use crate::{Error, Result};
 
 /// The tables of every species.
@@ -21,38 +22,37 @@ pub struct TableData {
 }
 
 impl TableData {
-    /// Uploads the tables of every species; all must have the same numbers of nodes. Without pair tables, which are most of
-    /// the bytes, two texels stand for what nobody reads.
+    /// Uploads the tables of every species, as described; all must have the same numbers of nodes. Without pair tables, which are
+    /// most of the bytes, two texels stand for what nobody reads.
     ///
     /// # Errors
-    /// [`Error::Usage`] when they differ; [`Error::Device`] when out of memory.
-    pub fn new(gpu: &Gpu, tables: &[&ForestTables], with_pairs: bool) -> Result<Self> {
+    /// [`Error::Usage`] when they differ from the description or among themselves; [`Error::Device`] when out of memory.
+    pub fn new(
+        gpu: &Gpu,
+        (pairs, views): (Option<VolumeDesc>, &ImageDesc),
+        tables: &[&ForestTables],
+    ) -> Result<Self> {
         let (n, m) = tables.first().map_or((1, 1), |t| (t.angles, t.densities));
-        if tables.iter().any(|t| (t.angles, t.densities) != (n, m)) {
+        let fits = views.size == [n + 1, m] && views.layers as usize == tables.len();
+        if !fits || tables.iter().any(|t| (t.angles, t.densities) != (n, m)) {
             return Err(Error::Usage("tables of species differ in their numbers of nodes".into()));
         }
-        let count = (tables.len() as u32).max(1);
+        let listed = pairs.is_some();
         // At least two slices, or it would not be a volume.
-        let size = if with_pairs { [n, n, (count * n * m).max(2)] } else { [1, 1, 2] };
-        let pairs = gpu.volume("pair tables", vk::Format::R16G16B16A16_SFLOAT, size)?;
+        let none = VolumeDesc { name: resource::PAIR_TABLES, format: views.format, size: [1, 1, 2] };
+        let VolumeDesc { name, format, size } = pairs.unwrap_or(none);
+        let pairs = gpu.volume(name, format, size)?;
         let half = |v: f32| f16::from_f32(v).to_bits();
         let mut texels: Vec<u16> = tables
             .iter()
-            .filter(|_| with_pairs)
+            .filter(|_| listed)
             .flat_map(|t| &t.pair)
             .flat_map(|values| values.map(half))
             .collect();
         texels.resize(4 * size.iter().product::<u32>() as usize, 0);
         gpu.upload_image(&pairs, 0, 0, 1, bytemuck::cast_slice(&texels))?;
-        let views = gpu.image(&ImageDesc {
-            name: "view tables",
-            format: vk::Format::R16G16B16A16_SFLOAT,
-            size: [n + 1, m],
-            layers: count,
-            levels: 1,
-            samples: 1,
-            usage: vk::ImageUsageFlags::empty(),
-        })?;
+        let count = views.layers;
+        let views = gpu.image(views)?;
         let mut texels = Vec::new();
         for t in tables {
             for (row, [d, c]) in t.view.chunks_exact(n as usize).zip(&t.ground) {
@@ -60,7 +60,6 @@ impl TableData {
                 texels.extend([half(*d), half(*c), 0, 0]);
             }
         }
-        texels.resize((4 * (n + 1) * m * count) as usize, 0);
         gpu.upload_image(&views, 0, 0, count, bytemuck::cast_slice(&texels))?;
         Ok(TableData { pairs, views, angles: n, densities: m })
     }

@@ -8,6 +8,7 @@ use crate::gpu::interface::{
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Program, Recorder, Resource, Sampler, shaders, vk};
 use crate::land::quadtree::{MIN_REFINE, QuadKey, Quadtree};
 use crate::plan::Plan;
+use crate::plan::names::{pass, resource};
 use crate::scene::{Albedo, Scene};
 use crate::{Error, Result};
 
@@ -56,48 +57,23 @@ impl TerrainData {
     /// [`Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
         let terrain = &scene.terrain;
-        let texture = |name, format, size| {
-            gpu.image(&ImageDesc {
-                name,
-                format,
-                size,
-                layers: 1,
-                levels: 1,
-                samples: 1,
-                usage: vk::ImageUsageFlags::empty(),
-            })
+        let image = |name, or: vk::Format| {
+            gpu.image(plan.images(name).next().unwrap_or(&ImageDesc::stand_in(name, or)))
         };
-        let size = terrain.heights.as_ref().map_or([1, 1], |r| [r.width, r.height]);
-        let heights = texture("height map", vk::Format::R32_SFLOAT, size)?;
+        let heights = image(resource::HEIGHT_MAP, vk::Format::R32_SFLOAT)?;
         let flat = [0f32];
         let samples = terrain.heights.as_ref().map_or(&flat[..], |r| &r.samples);
         gpu.upload_image(&heights, 0, 0, 1, bytemuck::cast_slice(samples))?;
-        let albedo = match &terrain.albedo {
+        let albedo = image(resource::ALBEDO, vk::Format::R32G32B32A32_SFLOAT)?;
+        match &terrain.albedo {
             Albedo::Uniform([r, g, b]) => {
-                let image = texture("ground albedo", vk::Format::R32G32B32A32_SFLOAT, [1, 1])?;
-                gpu.upload_image(&image, 0, 0, 1, bytemuck::cast_slice(&[*r, *g, *b, 1.0]))?;
-                image
+                gpu.upload_image(&albedo, 0, 0, 1, bytemuck::cast_slice(&[*r, *g, *b, 1.0]))?;
             }
-            Albedo::Image(t) => {
-                let image = texture("ground albedo", vk::Format::R8G8B8A8_SRGB, [t.width, t.height])?;
-                gpu.upload_image(&image, 0, 0, 1, &t.rgba)?;
-                image
-            }
-        };
-        let tiles = |name, format, side| {
-            gpu.image(&ImageDesc {
-                name,
-                format,
-                size: [side; 2],
-                layers: plan.height_tiles,
-                levels: 1,
-                samples: 1,
-                usage: vk::ImageUsageFlags::STORAGE,
-            })
-        };
+            Albedo::Image(t) => gpu.upload_image(&albedo, 0, 0, 1, &t.rgba)?,
+        }
         let tree = Quadtree::new(terrain, plan.plain_side);
-        let height_tiles = tiles("height tiles", vk::Format::R32_SFLOAT, TERRAIN_HEIGHTS)?;
-        let slope_tiles = tiles("slope tiles", vk::Format::R16G16B16A16_SFLOAT, TERRAIN_SLOPES)?;
+        let height_tiles = image(resource::HEIGHT_TILES, vk::Format::R32_SFLOAT)?;
+        let slope_tiles = image(resource::SLOPE_TILES, vk::Format::R16G16B16A16_SFLOAT)?;
         // Without relief the tile of no height and no slope serves every quad.
         let made = plan.height_tiles > 1 || terrain.heights.is_some();
         if !made {
@@ -219,7 +195,7 @@ impl TerrainData {
     /// Records the production of fresh tiles.
     pub fn produce(&self, recorder: &mut Recorder, draws: &TerrainDraws) {
         let Some(program) = self.program.as_ref().filter(|_| draws.fresh.1 > 0) else { return };
-        recorder.compute("terrain tiles", |pass| {
+        recorder.compute(pass::TERRAIN_TILES, |pass| {
             pass.bind(
                 program,
                 &[

@@ -2,16 +2,16 @@
 
 use super::Forest;
 use super::targets::ImageTargets;
-use super::trees::shader_map::{NODE_TEXELS, ShaderMap};
+use super::trees::shader_map::ShaderMap;
 use crate::Result;
-use crate::forest::coverage;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::gpu::interface::{ForestNode, TERRAIN_CELLS, TERRAIN_HEIGHTS};
 use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Layers, Program, Recorder, Resource, Sampler,
-    Targets, shaders, vk,
+    Targets, shaders,
 };
-use crate::plan::{Plan, ViewMode};
+use crate::plan::names::pass;
+use crate::plan::{NODE_TEXELS, Plan, ViewMode};
 
 /// Indices of the mesh of a quad of terrain.
 ///
@@ -38,15 +38,7 @@ impl NoTrees {
     /// [`crate::Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, plan: &Plan) -> Result<Self> {
         Ok(NoTrees {
-            coverage: gpu.image(&ImageDesc {
-                name: "no coverage",
-                format: coverage::format(plan.cover_channels),
-                size: [1; 2],
-                layers: 1,
-                levels: 1,
-                samples: 1,
-                usage: vk::ImageUsageFlags::empty(),
-            })?,
+            coverage: gpu.image(&ImageDesc::stand_in("no coverage", plan.cover_format()))?,
             nodes: gpu.texel_buffer("no nodes", size_of::<ForestNode>() as u64, NODE_TEXELS)?,
         })
     }
@@ -72,12 +64,12 @@ impl Ground {
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
     pub fn new(gpu: &Gpu, plan: &Plan) -> Result<Self> {
-        let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
+        let formats = plan.color_formats();
         let program = |shadowed: bool| {
             let mut constants = vec![
                 ("COVER_CHANNELS", plan.cover_channels),
                 ("COVER_SIDE", plan.coverage_size),
-                ("HAS_SUN", u32::from(plan.cascades > 0)),
+                ("HAS_SUN", u32::from(plan.sun)),
                 ("SHADOWED", u32::from(shadowed)),
             ];
             if plan.view_mode != ViewMode::Radiance {
@@ -127,7 +119,7 @@ impl Ground {
             targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), last)).collect();
         let depth = Some(targets.depth.attachment(Some([0.0; 4]), last));
         let (tiles, nodes) = self.none.or(forest);
-        recorder.render("terrain", &Targets { colors: &colors, depth, layers: Layers::One(0) }, |pass| {
+        recorder.render(pass::TERRAIN, &Targets { colors: &colors, depth, layers: Layers::One(0) }, |pass| {
             let resources = [
                 ("view", Resource::Buffer(view)),
                 ("quads", Resource::Buffer(&terrain.quads)),

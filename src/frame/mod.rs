@@ -55,9 +55,11 @@ impl Renderer {
     /// Builds what the plan lists.
     ///
     /// # Errors
-    /// [`crate::Error::Device`] when out of memory.
+    /// [`crate::Error::Usage`] when that is not what its numbers ask for ([`Plan::list`]); [`crate::Error::Device`] when out of
+    /// memory.
     pub fn new(gpu: &Gpu, scene: Arc<Scene>, plan: Plan, baked: &[Baked]) -> Result<Self> {
         let _build = info_span!("build").entered();
+        plan.check_items(&scene)?;
         let world = World::new(gpu, (&scene, &plan), baked)?;
         Ok(Renderer {
             canvas: Canvas::new(gpu, (&scene, &plan), &world)?,
@@ -76,7 +78,7 @@ impl Renderer {
     /// # Errors
     /// [`Error::Usage`] when the plan takes another world, and why; [`Error::Device`] when out of memory. Then all is as it was.
     pub fn resize(&mut self, plan: &Plan) -> Result<()> {
-        let plan = world::served(&self.plan, plan)?;
+        let plan = world::served(&self.scene, &self.plan, plan)?;
         let canvas = Canvas::new(&self.gpu, (&self.scene, &plan), &self.world)?;
         self.world.adapt(&self.gpu, &plan)?;
         (self.canvas, self.plan) = (canvas, plan);
@@ -196,7 +198,7 @@ impl Renderer {
     /// # Errors
     /// [`Error::Usage`] when it shines and the plan was made without.
     pub fn set_sun(&mut self, sun: Sun) -> Result<()> {
-        if self.plan.cascades == 0 && sun.shines() {
+        if !self.plan.sun && sun.shines() {
             return Err(Error::Usage("the plan was made without a sun: plan again for this one".into()));
         }
         Arc::make_mut(&mut self.scene).sun = sun;

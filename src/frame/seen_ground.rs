@@ -13,6 +13,7 @@ use crate::gpu::{
     shaders, vk,
 };
 use crate::plan::Plan;
+use crate::plan::names::pass;
 use crate::scene::{Scene, Sky};
 
 /// Finds and lights the ground.
@@ -52,7 +53,7 @@ impl SeenGround {
                     ("SAMPLES", plan.samples),
                     ("TREES", u32::from(plan.shows_trees())),
                     ("SKY_IMAGE", u32::from(matches!(scene.sky, Sky::LatLong { .. }))),
-                    ("HAS_SUN", u32::from(plan.cascades > 0)),
+                    ("HAS_SUN", u32::from(plan.sun)),
                     ("SHADOWED", u32::from(plan.cascades > 0)),
                     ("VIEW_MODE", plan.view_mode as u32),
                 ],
@@ -73,7 +74,7 @@ impl SeenGround {
     ) {
         let colors: Vec<_> = targets.quads.iter().map(|q| q.attachment(Some([0.0; 4]), false)).collect();
         let depth = Some(targets.depth.attachment(Some([0.0; 4]), false));
-        recorder.render("terrain", &Targets { colors: &colors, depth, layers: Layers::One(0) }, |pass| {
+        recorder.render(pass::TERRAIN, &Targets { colors: &colors, depth, layers: Layers::One(0) }, |pass| {
             pass.bind(
                 &self.mesh,
                 &[
@@ -101,7 +102,7 @@ impl SeenGround {
     ) {
         let Some(quads_seen) = &targets.quads else { return };
         let (tiles, nodes) = self.none.or(forest);
-        recorder.compute("ground", |pass| {
+        recorder.compute(pass::GROUND, |pass| {
             let more = targets.shown();
             let all = [
                 ("view", Resource::Buffer(view)),

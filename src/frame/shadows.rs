@@ -18,6 +18,7 @@ use crate::gpu::{
 };
 use crate::land::quadtree::Quadtree;
 use crate::plan::Plan;
+use crate::plan::names::{pass, resource};
 use crate::scene::Scene;
 
 /// Push constants of a draw of ground.
@@ -83,15 +84,8 @@ impl Shadows {
     /// [`crate::Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
         let on = plan.cascades > 0;
-        let map = gpu.image(&ImageDesc {
-            name: "shadow cascades",
-            format: vk::Format::D32_SFLOAT,
-            size: [if on { scene.settings.cascade_size } else { 1 }; 2],
-            layers: plan.cascades.max(1),
-            levels: 1,
-            samples: 1,
-            usage: vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
-        })?;
+        let none = ImageDesc::stand_in(resource::CASCADES, vk::Format::D32_SFLOAT);
+        let map = gpu.image(plan.images(resource::CASCADES).next().unwrap_or(&none))?;
         let program = |vert, frag, constants| {
             let depth = DepthTest::Reverse;
             gpu.graphics(&GraphicsDesc { vert, frag, colors: &[], samples: 1, depth, constants })
@@ -219,7 +213,7 @@ impl Shadows {
             for layers in &self.layers {
                 let depth = Some(Attachment { image: &self.map, resolve: None, clear: None });
                 let targets = Targets { colors: &[], depth, layers: *layers };
-                recorder.render("shadows", &targets, |pass| {
+                recorder.render(pass::SHADOWS, &targets, |pass| {
                     if batch == 0 {
                         self.draw_ground(pass, terrain, work, *layers);
                     }

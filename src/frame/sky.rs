@@ -4,9 +4,10 @@ use super::targets::ImageTargets;
 use crate::Result;
 use crate::camera::Light;
 use crate::gpu::{
-    Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Layers, Program, Recorder, Resource, Sampler,
-    Targets, shaders, vk,
+    Buffer, DepthTest, Gpu, GraphicsDesc, Image, Layers, Program, Recorder, Resource, Sampler, Targets,
+    shaders,
 };
+use crate::plan::names::{pass, resource};
 use crate::plan::{Plan, Rasterizer};
 use crate::scene::{Scene, Sky};
 
@@ -22,16 +23,9 @@ impl SkyPass {
     /// # Errors
     /// [`crate::Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Option<Self>> {
-        let Sky::LatLong { width, height, pixels } = &scene.sky else { return Ok(None) };
-        let image = gpu.image(&ImageDesc {
-            name: "sky image",
-            format: vk::Format::R32G32B32A32_SFLOAT,
-            size: [*width, *height],
-            layers: 1,
-            levels: 1,
-            samples: 1,
-            usage: vk::ImageUsageFlags::empty(),
-        })?;
+        let Sky::LatLong { pixels, .. } = &scene.sky else { return Ok(None) };
+        let Some(described) = plan.images(resource::SKY).next() else { return Ok(None) };
+        let image = gpu.image(described)?;
         let scale = Light::new(scene).scale as f32;
         // Half floats hold up to 65504: a sun's disc in the image is clamped there, relative to the mean light.
         let texels: Vec<[f32; 4]> = pixels
@@ -40,7 +34,7 @@ impl SkyPass {
             .map(|[r, g, b]| [r, g, b, 1.0])
             .collect();
         gpu.upload_image(&image, 0, 0, 1, bytemuck::cast_slice(&texels))?;
-        let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
+        let formats = plan.color_formats();
         let program = gpu.graphics(&GraphicsDesc {
             vert: &shaders::FRAME_SKY_VERT,
             frag: if plan.layers { &shaders::FRAME_SKY_LAYERS_FRAG } else { &shaders::FRAME_SKY_FRAG },
@@ -56,10 +50,14 @@ impl SkyPass {
     /// Records the pass.
     pub fn record(&self, recorder: &mut Recorder, view: &Buffer, targets: &ImageTargets) {
         let colors: Vec<_> = targets.colors.iter().map(|t| t.attachment(Some([0.0; 4]), false)).collect();
-        recorder.render("sky", &Targets { colors: &colors, depth: None, layers: Layers::One(0) }, |pass| {
-            let sky = ("sky", Resource::Texture(&self.image, Sampler::LinearRepeat));
-            pass.bind(&self.program, &[("view", Resource::Buffer(view)), sky]);
-            pass.draw(3, 1);
-        });
+        recorder.render(
+            pass::SKY,
+            &Targets { colors: &colors, depth: None, layers: Layers::One(0) },
+            |pass| {
+                let sky = ("sky", Resource::Texture(&self.image, Sampler::LinearRepeat));
+                pass.bind(&self.program, &[("view", Resource::Buffer(view)), sky]);
+                pass.draw(3, 1);
+            },
+        );
     }
 }

@@ -95,14 +95,21 @@ impl World {
     /// That no tree is to be drawn by itself where the plan has none such.
     fn can_show(&self, scene: &Scene, plan: &Plan, eye: &Eye) -> Result<()> {
         let (extent, heights) = (scene.terrain.extent, self.terrain.tree.total_range());
-        if plan.z_fields || !plan.trees_in_range(extent, heights, eye.position) {
-            return Ok(());
+        if !plan.z_fields && plan.trees_in_range(extent, heights, eye.position) {
+            return Err(Error::Usage(format!(
+                "trees are within {:.0} m of this camera, and the plan was made where none are, so it draws none by itself: plan \
+                 again for this camera",
+                plan.last_range()
+            )));
         }
-        Err(Error::Usage(format!(
-            "trees are within {:.0} m of this camera, and the plan was made where none are, so it draws none by itself: plan \
-             again for this camera",
-            plan.last_range()
-        )))
+        if !plan.trees_within(extent, heights, eye.position) {
+            return Err(Error::Usage(format!(
+                "trees are farther than {:.0} m from this camera, and the plan was made where none is, so it does not draw them: plan \
+                 again for this camera",
+                plan.range
+            )));
+        }
+        Ok(())
     }
 
     /// Tiles thrown out so far.

@@ -3,15 +3,11 @@
 use half::f16;
 
 use crate::camera::NEAR_PLANE;
-use crate::gpu::{Attachment, Buffer, Gpu, Image, ImageDesc, Resource, vk};
+use crate::gpu::{Attachment, Buffer, Gpu, Image, Resource};
 use crate::image::{Linear, Picture};
-use crate::plan::{Plan, Rasterizer};
-use crate::{Result, gpu};
-
-/// Radiance as half floats, relative to the scene's brightest light.
-pub const RADIANCE: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
-/// Species, counted from 1; 0 where no tree is.
-pub const SPECIES: vk::Format = vk::Format::R32_UINT;
+use crate::plan::Plan;
+use crate::plan::names::resource;
+use crate::{Error, Result};
 
 /// A colour target: multisampled if the plan says so, and its resolved image.
 pub struct ColorTarget {
@@ -21,29 +17,12 @@ pub struct ColorTarget {
 }
 
 impl ColorTarget {
-    fn new(
-        gpu: &Gpu,
-        plan: &Plan,
-        name: &str,
-        format: vk::Format,
-        usage: vk::ImageUsageFlags,
-        samples: u32,
-    ) -> Result<Self> {
-        let make = |samples, usage| {
-            gpu.image(&ImageDesc { name, format, size: plan.size, layers: 1, levels: 1, samples, usage })
-        };
-        let resolved = usage
-            | if format == vk::Format::D32_SFLOAT {
-                vk::ImageUsageFlags::empty()
-            } else {
-                vk::ImageUsageFlags::STORAGE
-            };
-        Ok(ColorTarget {
-            multisampled: (samples > 1)
-                .then(|| make(samples, usage | vk::ImageUsageFlags::SAMPLED))
-                .transpose()?,
-            image: make(1, resolved)?,
-        })
+    /// The target of a name, if the plan lists it.
+    fn new(gpu: &Gpu, plan: &Plan, name: &str) -> Result<Option<Self>> {
+        let find = |many: bool| plan.images(name).find(|d| (d.samples > 1) == many);
+        let Some(one) = find(false) else { return Ok(None) };
+        let multisampled = find(true).map(|d| gpu.image(d)).transpose()?;
+        Ok(Some(ColorTarget { multisampled, image: gpu.image(one)? }))
     }
 
     /// The image whose samples are drawn: the multisampled one, or, with one sample a pixel, the only one.
@@ -76,47 +55,20 @@ pub struct ImageTargets {
 }
 
 impl ImageTargets {
-    /// Allocates for a plan.
+    /// Allocates what a plan lists.
     ///
     /// # Errors
-    /// [`crate::Error::Device`] when out of memory.
+    /// [`Error::Usage`] when it lists no picture; [`Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, plan: &Plan) -> Result<Self> {
-        let color = vk::ImageUsageFlags::COLOR_ATTACHMENT;
-        let formats: &[(&str, vk::Format)] = Self::formats(plan.layers);
-        let pixels = u64::from(plan.size[0]) * u64::from(plan.size[1]);
-        let tiles = plan.rasterizer == Rasterizer::Tiles;
-        // What tiles find by samples they put together by pixels.
-        let drawn = if tiles { 1 } else { plan.samples };
+        let target = |name: &str| ColorTarget::new(gpu, plan, name);
+        let missing = |name: &str| Error::Usage(format!("the plan lists no image \"{name}\""));
+        let needed = |name: &str| target(name)?.ok_or_else(|| missing(name));
         Ok(ImageTargets {
-            colors: formats
-                .iter()
-                .map(|(name, format)| ColorTarget::new(gpu, plan, name, *format, color, drawn))
-                .collect::<Result<_>>()?,
-            depth: ColorTarget::new(
-                gpu,
-                plan,
-                "depth",
-                vk::Format::D32_SFLOAT,
-                vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
-                plan.samples,
-            )?,
-            quads: tiles
-                .then(|| ColorTarget::new(gpu, plan, "quads seen", vk::Format::R32_UINT, color, plan.samples))
-                .transpose()?,
-            first_depth: (tiles && plan.layers)
-                .then(|| {
-                    gpu.image(&ImageDesc {
-                        name: "first depth",
-                        format: vk::Format::R32_SFLOAT,
-                        size: plan.size,
-                        layers: 1,
-                        levels: 1,
-                        samples: 1,
-                        usage: vk::ImageUsageFlags::STORAGE,
-                    })
-                })
-                .transpose()?,
-            picture: gpu.buffer("picture", pixels * 4)?,
+            colors: plan.colors().iter().map(|(name, _)| needed(name)).collect::<Result<_>>()?,
+            depth: needed(resource::DEPTH)?,
+            quads: target(resource::QUADS_SEEN)?,
+            first_depth: plan.images(resource::FIRST_DEPTH).next().map(|d| gpu.image(d)).transpose()?,
+            picture: gpu.described_buffer(&plan.buffer(resource::PICTURE))?,
         })
     }
 
@@ -158,14 +110,5 @@ impl ImageTargets {
         let colors = names.iter().zip(&self.colors).map(|(name, c)| (*name, &c.image));
         let depth = self.first_depth.iter().map(|image| ("depth_at", image));
         colors.chain(depth).map(|(name, image)| (name, Resource::Storage(image))).collect()
-    }
-
-    /// Colour attachments with and without layers.
-    pub fn formats(layers: bool) -> &'static [(&'static str, gpu::vk::Format)] {
-        if layers {
-            &[("sun part", RADIANCE), ("sky part", RADIANCE), ("species", SPECIES), ("fractions", RADIANCE)]
-        } else {
-            &[("radiance", RADIANCE)]
-        }
     }
 }

@@ -4,6 +4,7 @@ use super::targets::ImageTargets;
 use crate::Result;
 use crate::gpu::interface::TonemapParameters;
 use crate::gpu::{Gpu, Program, Recorder, Resource, Sampler, shaders};
+use crate::plan::names::pass;
 use crate::plan::{Plan, ViewMode};
 
 /// Tone maps the resolved image.
@@ -29,7 +30,7 @@ impl Tonemap {
     /// Records the pass.
     pub fn record(&self, recorder: &mut Recorder, targets: &ImageTargets, plan: &Plan, exposure: f64) {
         let part = |k: usize| Resource::Texture(&targets.colors[k].image, Sampler::Nearest);
-        recorder.compute("tone map", |pass| {
+        recorder.compute(pass::TONE_MAP, |pass| {
             let (first, second) = (part(0), part(self.parts.saturating_sub(1) as usize));
             let picture = ("picture", Resource::Buffer(&targets.picture));
             pass.bind(&self.program, &[("radiance", first), ("second_part", second), picture]);

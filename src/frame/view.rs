@@ -63,7 +63,7 @@ pub fn view(
     view.hotspot_amplitude = s.hotspot_amplitude;
     view.hotspot_width = s.hotspot_width;
     view.ground_contrast = s.ground_contrast;
-    view.convergence = s.convergence;
+    view.convergence = plan.convergence as f32;
     view.silhouette_ratio = plan.silhouette_ratio as f32;
     view.silhouette_step = plan.tallest as f32;
     view.height_cell = scene.terrain.cell_size as f32;

@@ -69,7 +69,7 @@ impl Forest {
     ) -> Result<Self> {
         let species = SpeciesData::new(gpu, scene, plan, baked)?;
         let tables: Vec<_> = baked.iter().map(|b| b.tables.as_ref()).collect();
-        let tables = TableData::new(gpu, &tables, plan.pair_tables)?;
+        let tables = TableData::new(gpu, plan.tables()?, &tables)?;
         let near = || -> Result<NearTrees> {
             Ok(NearTrees {
                 cull: CullData::new(gpu, scene, plan, &tables)?,
@@ -100,8 +100,7 @@ impl World {
     /// [`crate::Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, (scene, plan): (&Scene, &Plan), baked: &[Baked]) -> Result<Self> {
         let terrain = TerrainData::new(gpu, scene, plan)?;
-        let forest =
-            (plan.range > 0.0).then(|| Forest::new(gpu, (scene, plan), baked, &terrain)).transpose()?;
+        let forest = plan.forest.then(|| Forest::new(gpu, (scene, plan), baked, &terrain)).transpose()?;
         Ok(World {
             view: gpu.buffer("view", size_of::<View>() as u64)?,
             terrain_indices: ground::mesh_indices(gpu)?,
@@ -181,17 +180,17 @@ impl World {
 ///
 /// # Errors
 /// [`Error::Usage`] with what differs, or does not suffice.
-pub(super) fn served(held: &Plan, wanted: &Plan) -> Result<Plan> {
+pub(super) fn served(scene: &Scene, held: &Plan, wanted: &Plan) -> Result<Plan> {
     let same = |a: &Plan, b: &Plan| -> [(&str, bool); 8] {
         let grid = |p: &Plan| [p.quad_side, p.tile_side, p.pattern_density, p.plain_side].map(f64::to_bits);
         [
-            ("representation", a.representation == b.representation),
+            ("ladder", a.ladder == b.ladder),
             ("rasterizer", a.rasterizer == b.rasterizer),
             ("view mode", a.view_mode == b.view_mode),
             ("samples and layers", (a.samples, a.layers) == (b.samples, b.layers)),
             ("trees one by one", (a.z_fields, a.transfer_bands) == (b.z_fields, b.transfer_bands)),
             ("tables", a.pair_tables == b.pair_tables),
-            ("sun", a.cascades == b.cascades),
+            ("sun", (a.sun, a.cascades) == (b.sun, b.cascades)),
             ("seed quads", grid(a) == grid(b) && a.region_capacity == b.region_capacity),
         ]
     };
@@ -216,8 +215,7 @@ pub(super) fn served(held: &Plan, wanted: &Plan) -> Result<Plan> {
             "an image of {w} x {h} takes another world: {why}; make another renderer, or plan the world for the largest image"
         )));
     }
-    Ok(Plan {
-        items: wanted.items.clone(),
+    let mut plan = Plan {
         size: wanted.size,
         shadow_distance: wanted.shadow_distance,
         species_range: wanted.species_range.clone(),
@@ -225,5 +223,7 @@ pub(super) fn served(held: &Plan, wanted: &Plan) -> Result<Plan> {
         silhouette_ratio: wanted.silhouette_ratio,
         draw_limits: wanted.draw_limits,
         ..held.clone()
-    })
+    };
+    plan.list(scene);
+    Ok(plan)
 }

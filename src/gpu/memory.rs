@@ -21,7 +21,7 @@ pub struct Buffer {
 }
 
 /// What an image is.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageDesc<'a> {
     /// Name in captures and reports.
     pub name: &'a str,

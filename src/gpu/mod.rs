@@ -11,6 +11,7 @@
 
 mod capture;
 mod context;
+mod description;
 mod failures;
 pub mod interface;
 mod memory;
@@ -25,6 +26,7 @@ mod transfer;
 pub use ash::vk;
 pub use capture::FrameCapture;
 pub use context::{Gpu, GpuOptions, Validation};
+pub use description::{BufferDesc, Description, VolumeDesc};
 #[doc(hidden)]
 pub use failures::Failure;
 pub use memory::{Buffer, Image, ImageDesc};

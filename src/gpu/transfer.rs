@@ -161,7 +161,7 @@ fn copy_region(image: &Image, level: u32, first: u32, layers: u32) -> vk::Buffer
         .image_extent(vk::Extent3D { width: w, height: h, depth: image.depth() })
 }
 
-fn texel_bytes(format: vk::Format) -> Result<usize> {
+pub(super) fn texel_bytes(format: vk::Format) -> Result<usize> {
     Ok(match format {
         vk::Format::R8_UNORM | vk::Format::R8_UINT => 1,
         vk::Format::R8G8B8A8_UNORM

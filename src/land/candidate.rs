@@ -11,7 +11,7 @@ use crate::physics::terrain::height_and_slope;
 use crate::scene::{Distribution, Scene, TreePosition};
 
 /// Points of a Wang tile, about.
-pub const POINTS: u32 = 256;
+const POINTS: u32 = 256;
 /// Purposes of a tree's random numbers, as in `shaders/physics/hash.glsl`.
 const HASH_TURN: u32 = 0x51ed_270b;
 const HASH_SCALE: u32 = 0x2c1b_3c6d;

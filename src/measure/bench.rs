@@ -263,6 +263,7 @@ fn result(
         size: plan.size,
         settings: BenchResult::settings_of(&scene.settings),
         rasterizer: Some(plan.rasterizer.name().into()),
+        ladder: Some(scene.ladder.to_string()),
         timing: gpu.timing().into(),
         device: gpu.info().into(),
         host: host.clone(),

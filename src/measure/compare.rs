@@ -17,6 +17,7 @@ use std::collections::BTreeMap;
 
 use super::results::{BenchResult, Frame};
 use super::statistics::{block_bootstrap, holm, mann_whitney, median, signed_rank};
+use crate::ladder::Ladder;
 use crate::plan::Rasterizer;
 use crate::{Error, Result};
 
@@ -171,6 +172,9 @@ pub fn differences(a: &BenchResult, b: &BenchResult) -> Vec<Difference> {
     let rasterizer =
         |r: &BenchResult| r.rasterizer.clone().unwrap_or_else(|| Rasterizer::Graphics.name().into());
     check("settings", "rasterizer", &rasterizer(a), &rasterizer(b));
+    // Those of before ladders had the one that scenes have now that say nothing.
+    let ladder = |r: &BenchResult| r.ladder.clone().unwrap_or_else(|| Ladder::default().to_string());
+    check("settings", "ladder", &ladder(a), &ladder(b));
     check("timing", "timing", &a.timing, &b.timing);
     check("device", "device", &a.device, &b.device);
     check("device", "cpu", &a.host.cpu, &b.host.cpu);

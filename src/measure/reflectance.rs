@@ -164,7 +164,7 @@ fn mean_albedo(albedo: &crate::scene::Albedo) -> [f32; 3] {
     }
 }
 
-/// Measures one sun, slope, distance and representation for all views; `progress` is called after every image.
+/// Measures one sun, slope, distance and ladder for all views; `progress` is called after every image.
 ///
 /// # Errors
 /// [`Error::Usage`] for angles that see no ground; [`Error::Device`] if the device fails.

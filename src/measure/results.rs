@@ -33,6 +33,9 @@ pub struct BenchResult {
     /// What found the samples of trees: `graphics` or `tiles`; absent from results that are older than the choice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rasterizer: Option<String>,
+    /// What stood for a tree, near to far, as it was asked for; absent from results that are older than ladders.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ladder: Option<String>,
     /// How passes were timed.
     pub timing: TimingIdentity,
     /// Which device.

@@ -19,15 +19,24 @@
 /// ν of BN12, eq. 22–25: how far light and ground have converged to their averages, which they are from `end` on.
 ///
 /// BN12 end at 0.8. Trees of a few pixels know their light only roughly: shadow maps blur it, so that what is brightest
-/// (the hotspot) darkens and what is darkest brightens. An earlier end keeps more of the average and takes fewer shadows.
+/// (the hotspot) darkens and what is darkest brightens. An earlier end keeps more of the average and takes fewer shadows. At an
+/// end of 0 nothing ever converges.
 pub fn converged(relative: f64, end: f64) -> f64 {
+    if end <= 0.0 {
+        return 0.0;
+    }
     let t = (relative / end).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
+/// s/s_max from which on the shader-map shows trees: where the first one begins to fade.
+pub const HANDOVER_FROM: f64 = 0.8;
+/// 1 over the width of the band in which all of them fade.
+pub const HANDOVER_RATE: f64 = 5.0;
+
 /// S: share of the trees that the shader-map shows; 0 up to 0.8, 1 from 1 on.
 pub fn handed_over(relative: f64) -> f64 {
-    let t = ((relative - 0.8) / 0.2).clamp(0.0, 1.0);
+    let t = ((relative - HANDOVER_FROM) * HANDOVER_RATE).clamp(0.0, 1.0);
     if t < 0.5 { 2.0 * t * t } else { 1.0 - 2.0 * (1.0 - t) * (1.0 - t) }
 }
 
@@ -68,6 +77,12 @@ mod tests {
         }
         // Alone, a tree fades within a tenth of the range.
         assert_eq!((tree_fade(0.85, 0.5), tree_fade(0.951, 0.5)), (1.0, 0.0));
+    }
+
+    #[test]
+    fn light_that_never_converges_does_so_at_no_distance() {
+        assert!([0.0, 0.5, 1.0, 1e9].iter().all(|relative| converged(*relative, 0.0) == 0.0));
+        assert_eq!([0.0, 0.45, 1.0].map(|relative| converged(relative, 0.45)), [0.0, 1.0, 1.0]);
     }
 
     #[test]

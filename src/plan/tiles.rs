@@ -1,8 +1,10 @@
 //! What finds the samples of trees, and what compute tiles take for that.
 
-use super::{Plan, Representation};
+use super::Plan;
+use super::names::{pass, pipeline};
 use crate::gpu::interface::{BIN_LANES, DEPTH_BINS, ORDER_LANES, SIGHT_TEXELS, TileState};
-use crate::gpu::{DeviceInfo, tree_components};
+use crate::gpu::{BufferDesc, DeviceInfo, tree_components, vk};
+use crate::ladder::Ladder;
 use crate::{Error, Result};
 
 /// Steps of writing the lists (trees, and entries): an invocation takes 1/64 of them, and drivers end loops after 65,535 turns.
@@ -12,20 +14,20 @@ const MOST_LISTS: u32 = 16384;
 
 /// Pipelines of the tiles that find and light trees.
 pub(super) const TREE_PIPELINES: [(&str, &str); 6] = [
-    ("tree order", "trees of the tiles, sorted front to back"),
-    ("tree sights", "what finding a tree's samples takes, once a tree"),
-    ("tile lists", "which trees may be seen in which square of pixels"),
-    ("tiles", "the tree that each sample sees before the ground"),
-    ("tree light", "light on trees, once a pixel and tree that it sees"),
-    ("tile sums", "prefix sums of the tiles' counts"),
+    (pipeline::TREE_ORDER, "trees of the tiles, sorted front to back"),
+    (pipeline::TREE_SIGHTS, "what finding a tree's samples takes, once a tree"),
+    (pipeline::TILE_LISTS, "which trees may be seen in which square of pixels"),
+    (pipeline::TILES, "the tree that each sample sees before the ground"),
+    (pipeline::TREE_LIGHT, "light on trees, once a pixel and tree that it sees"),
+    (pipeline::TILE_SUMS, "prefix sums of the tiles' counts"),
 ];
 /// Passes of the tiles that find trees.
 pub(super) const TREE_PASSES: [(&str, &str); 5] = [
-    ("tree order", "trees in view front to back, so that tiles may stop early"),
-    ("tree sights", "what finding a tree's samples takes, once a tree"),
-    ("list counts", "no entries yet"),
-    ("tile lists", "which trees may be seen in which square of pixels"),
-    ("tiles", "the tree that each sample sees before the ground"),
+    (pass::TREE_ORDER, "trees in view front to back, so that tiles may stop early"),
+    (pass::TREE_SIGHTS, "what finding a tree's samples takes, once a tree"),
+    (pass::LIST_COUNTS, "no entries yet"),
+    (pass::TILE_LISTS, "which trees may be seen in which square of pixels"),
+    (pass::TILES, "the tree that each sample sees before the ground"),
 ];
 
 /// What finds the samples of trees that are drawn one by one, and whether the ground is lit as it is drawn or where it is seen.
@@ -51,37 +53,33 @@ impl Rasterizer {
 }
 
 /// How a picture's trees are drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Drawing {
-    /// What stands for a tree.
-    pub representation: Representation,
+    /// What stands for a tree, near to far; `None`: what the scene says.
+    pub ladder: Option<Ladder>,
     /// What finds its samples; `None`: what suits the device (see [`Rasterizer::NAMES`]).
     pub rasterizer: Option<Rasterizer>,
 }
 
-impl From<Representation> for Drawing {
-    fn from(representation: Representation) -> Self {
-        Drawing { representation, rasterizer: None }
+impl From<Ladder> for Drawing {
+    fn from(ladder: Ladder) -> Self {
+        Drawing { ladder: Some(ladder), rasterizer: None }
     }
 }
 
 impl From<Rasterizer> for Drawing {
     fn from(rasterizer: Rasterizer) -> Self {
-        Drawing { representation: Representation::default(), rasterizer: Some(rasterizer) }
+        Drawing { ladder: None, rasterizer: Some(rasterizer) }
     }
 }
 
 /// A buffer of the tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TileBuffer {
-    /// Name, as in captures and reports.
-    pub name: &'static str,
-    /// Bytes.
-    pub bytes: u64,
-    /// Bytes of a texel, where shaders read it as texels; else 0.
-    pub texel: u64,
+    /// What it is.
+    pub desc: BufferDesc,
     /// What needs it.
-    reason: &'static str,
+    pub(super) reason: &'static str,
 }
 
 /// What compute tiles take for trees.
@@ -130,7 +128,15 @@ impl TileBuffers {
         let list_parts = u64::from(lists[0] * lists[1] * BIN_LANES);
         let trees = u64::from(plan.tree_capacity);
         let samples = u64::from(plan.size[0]) * u64::from(plan.size[1]) * u64::from(plan.samples);
-        let buffer = |name, bytes, texel, reason| TileBuffer { name, bytes, texel, reason };
+        let buffer = |name, bytes, texel, reason| {
+            let texels = match texel {
+                0 => None,
+                4 => Some((vk::Format::R32_UINT, 4)),
+                8 => Some((vk::Format::R32G32_UINT, 8)),
+                _ => Some((vk::Format::R32G32B32A32_UINT, 16)),
+            };
+            TileBuffer { desc: BufferDesc { name, bytes, texels }, reason }
+        };
         TileBuffers {
             list_shift,
             lists,
@@ -191,23 +197,14 @@ impl TileBuffers {
     fn beyond(&self, device: &DeviceInfo) -> Option<String> {
         let texels = u64::from(device.max_texel_elements);
         self.all().into_iter().find_map(|b| {
-            if b.texel > 0 && b.bytes / b.texel > texels {
-                let wanted = b.bytes / b.texel;
-                return Some(format!(
-                    "\"{}\" has {wanted} texels, and shaders read {texels} at most",
-                    b.name
-                ));
+            let BufferDesc { name, bytes, texels: read } = b.desc;
+            let wanted = read.map_or(0, |(_, texel)| bytes / texel);
+            if wanted > texels {
+                return Some(format!("\"{name}\" has {wanted} texels, and shaders read {texels} at most"));
             }
-            (b.bytes > device.max_storage_bytes)
-                .then(|| format!("\"{}\" is larger than a storage buffer may be", b.name))
+            (bytes > device.max_storage_bytes)
+                .then(|| format!("\"{name}\" is larger than a storage buffer may be"))
         })
-    }
-}
-
-impl TileBuffer {
-    /// As an item of a plan: name, reason and bytes.
-    pub(super) fn item(&self) -> (&'static str, String, u64) {
-        (self.name, self.reason.to_string(), self.bytes)
     }
 }
 

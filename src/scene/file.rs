@@ -15,6 +15,7 @@ use toml::de::DeTable;
 use super::input::read_text;
 use super::keys::{Item, Source, Table};
 use super::{Camera, Scene, Sky, Sun, texture};
+use crate::ladder::{Ladder, LadderError};
 use crate::settings::{KNOBS, PRESETS, Settings, nearest};
 use crate::{Error, Result};
 
@@ -65,16 +66,18 @@ fn read(text: &str, path: &Path, preset: Option<&str>) -> Result<Scene> {
     let known = ["name", "seed", "terrain", "species", "sun", "sky", "camera", "quality"];
     let root = Table::root(&source, document.get_ref(), &known)?;
     let folder = path.parent().unwrap_or(Path::new(""));
+    let (settings, ladder) = match root.get("quality") {
+        Some(item) => quality(&item, settings, preset.is_some())?,
+        None => (settings, Ladder::default()),
+    };
     let terrain = terrain::read(&root.require("terrain")?, folder)?;
     Ok(Scene {
         name: name(&root, path)?,
         seed: root.get("seed").map_or(Ok(0), |i| i.whole())?,
         // Cameras before species: a mistake there should not wait for the models to load.
         cameras: cameras(&root.require("camera")?, terrain.origin)?,
-        settings: match root.get("quality") {
-            Some(item) => quality(&item, settings, preset.is_some())?,
-            None => settings,
-        },
+        settings,
+        ladder,
         sun: root
             .get("sun")
             .map_or(Ok(Sun { azimuth: 0.0, elevation: 90.0, irradiance: [0.0; 3] }), |i| sun(&i))?,
@@ -174,9 +177,9 @@ fn cameras(item: &Item, origin: [f64; 2]) -> Result<Vec<Camera>> {
     Ok(cameras)
 }
 
-/// The preset, unless the caller has chosen one, then the knobs.
-fn quality(item: &Item, mut settings: Settings, chosen: bool) -> Result<Settings> {
-    let known: Vec<&str> = std::iter::once("preset").chain(KNOBS.iter().map(|k| k.name)).collect();
+/// The preset, unless the caller has chosen one, then the knobs; and the ladder.
+fn quality(item: &Item, mut settings: Settings, chosen: bool) -> Result<(Settings, Ladder)> {
+    let known: Vec<&str> = ["preset", "ladder"].into_iter().chain(KNOBS.iter().map(|k| k.name)).collect();
     let table = item.table(&known)?;
     if let Some(preset) = table.get("preset") {
         let name = preset.text()?;
@@ -191,11 +194,14 @@ fn quality(item: &Item, mut settings: Settings, chosen: bool) -> Result<Settings
             settings = own;
         }
     }
-    for item in table.items().iter().filter(|i| i.name() != "preset") {
+    for item in table.items().iter().filter(|i| !["preset", "ladder"].contains(&i.name())) {
         let value = item.number(f64::MIN..=f64::MAX, "")?;
         settings
             .set(item.name(), value)
             .map_err(|e| item.error(e.to_string(), "choose a value in the range"))?;
     }
-    Ok(settings)
+    let ladder = table.get("ladder").map_or(Ok(Ladder::default()), |item| {
+        item.text()?.parse().map_err(|e: LadderError| item.error(e.what, &e.remedy))
+    })?;
+    Ok((settings, ladder))
 }

@@ -15,6 +15,7 @@ pub mod texture;
 
 use std::sync::Arc;
 
+use crate::ladder::Ladder;
 use crate::physics::light::sun_disc_fraction;
 use crate::physics::raster::Raster;
 use crate::physics::terrain::height_and_slope;
@@ -42,6 +43,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Preset and knobs.
     pub settings: Settings,
+    /// What stands for a tree, near to far.
+    pub ladder: Ladder,
 }
 
 impl Scene {

@@ -82,6 +82,7 @@ fn those_that_cast_into_drawn_pages_are_those_of_the_cpu() {
     let mut plan = Plan::new(&scene, &cameras[0].1, [96, 64], false, Some(gpu.info())).unwrap();
     // All in one batch.
     plan.caster_capacity *= 16;
+    plan.list(&scene);
     let baked = device::bake(&scene);
     let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), plan, &baked).unwrap();
     for (name, camera) in &cameras {

@@ -382,6 +382,7 @@ fn every_quad_finds_its_place_in_a_tile_also_with_few_slots() {
     for slots in [0, 20, 6, 1] {
         let mut plan = Plan::new(&scene, &camera, SIZE, false, Some(gpu.info())).unwrap();
         plan.cover_slots = if slots > 0 { slots } else { plan.cover_slots };
+        plan.list(&scene);
         let capacity = plan.cover_slots;
         let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), plan, &baked).unwrap();
         let report = renderer.render(&camera, 1.0).unwrap();
@@ -436,6 +437,7 @@ fn tiles_stay_and_are_the_same_bits_when_they_come_back() {
     let there = device::camera([3900.0, 3900.0, 20.0], [3400.0, 3400.0, 0.0]);
     let mut plan = Plan::new(&scene, &here, SIZE, false, Some(gpu.info())).unwrap();
     plan.cover_slots = 90;
+    plan.list(&scene);
     let baked = device::bake(&scene);
     let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), plan, &baked).unwrap();
     let mut visit = |camera: &Camera| {

@@ -267,6 +267,7 @@ fn sums_over_many_workgroups_are_right_to_the_last() {
     let (camera, mut plan) = (above(side), plan(&scene, side));
     plan.region_capacity = 16 * CULL_GROUP;
     plan.caster_capacity = 16 * plan.region_capacity;
+    plan.list(&scene);
     let baked = device::bake(&scene);
     let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), plan, &baked).unwrap();
     let (report, view) = renderer.render_eye(&Eye::new(&camera, &scene.terrain, [48, 48]), 1.0).unwrap();

@@ -1,15 +1,18 @@
 //! What a scene does not require is neither planned, allocated nor drawn; and what is left out changes no bit of the image.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::device;
 use canopy::Error;
 use canopy::camera::Eye;
 use canopy::frame::Renderer;
-use canopy::gpu::Gpu;
+use canopy::gpu::{Description, Gpu};
 use canopy::image::{Linear, Picture};
+use canopy::ladder::Ladder;
 use canopy::physics::raster::Raster;
-use canopy::plan::{Drawing, Plan, Rasterizer, Representation, TileBuffers};
+use canopy::plan::names::{pass, pipeline, resource};
+use canopy::plan::{Drawing, Plan, Rasterizer, TileBuffers};
 use canopy::scene::{Camera, Distribution, Scene};
 
 const SIZE: [u32; 2] = [64, 48];
@@ -30,6 +33,19 @@ struct Drawn {
     allocated: Vec<(String, u64)>,
     pipelines: Vec<&'static str>,
     planned: u64,
+    /// The same by buffer and image.
+    described: BTreeMap<&'static str, u64>,
+}
+
+/// Bytes that a plan describes, by buffer and image.
+fn described(plan: &Plan) -> BTreeMap<&'static str, u64> {
+    let mut all = BTreeMap::new();
+    for item in &plan.items {
+        for d in &item.allocations {
+            *all.entry(d.name()).or_default() += d.bytes() / u64::from(item.shares);
+        }
+    }
+    all
 }
 
 /// Plans, builds and draws.
@@ -55,12 +71,14 @@ fn drawn(gpu: &Gpu, scene: &Scene, plan: Plan) -> (Drawn, Picture) {
         allocated: gpu.memory_report(),
         pipelines: gpu.pipelines().into_iter().map(|p| p.0).collect(),
         planned: plan.bytes(),
+        described: described(plan),
     };
     (drawn, renderer.picture().unwrap())
 }
 
-/// The picture under a plan that need not list what is drawn.
-fn picture(gpu: &Gpu, scene: &Scene, plan: Plan) -> Picture {
+/// The picture under a plan whose numbers were changed: it need not list the passes that are drawn.
+fn picture(gpu: &Gpu, scene: &Scene, mut plan: Plan) -> Picture {
+    plan.list(scene);
     let mut renderer = Renderer::new(gpu, Arc::new(scene.clone()), plan, &device::bake(scene)).unwrap();
     renderer.render(&scene.cameras[0], 1.0).unwrap();
     renderer.picture().unwrap()
@@ -115,12 +133,14 @@ fn without_a_sun(rasterizer: Rasterizer) {
     let gpu = device::open();
     let mut scene = scene();
     let day = draw(&gpu, &scene, rasterizer);
-    assert!(day.has("shadow cascades") && day.draws("shadows") && day.bytes("shadow cascades") > 1 << 18);
+    assert!(
+        day.has("shadow cascades") && day.draws(pass::SHADOWS) && day.bytes(resource::CASCADES) > 1 << 18
+    );
     for (elevation, irradiance) in [(-5.0, 1.0), (25.0, 0.0)] {
         scene.sun.elevation = elevation;
         scene.sun.irradiance = [irradiance; 3];
         let night = draw(&gpu, &scene, rasterizer);
-        assert!(!night.has("shadow cascades") && !night.draws("shadows"));
+        assert!(!night.has("shadow cascades") && !night.draws(pass::SHADOWS));
         for shader in ["forest/casters.comp", "frame/trees/zfield_shadow.frag"] {
             assert!(day.builds(shader) && !night.builds(shader), "{shader}: {:?}", night.pipelines);
         }
@@ -130,7 +150,7 @@ fn without_a_sun(rasterizer: Rasterizer) {
         hills(&mut relief);
         assert!(draw(&gpu, &relief, rasterizer).builds("frame/terrain_shadow.frag"));
         // One texel stands for the map that nobody reads.
-        assert!(night.bytes("shadow cascades") < 1 << 16 && night.bytes("shadow depth") == 0);
+        assert!(night.bytes(resource::CASCADES) < 1 << 16 && night.bytes("shadow depth") == 0);
         assert!(night.planned < day.planned);
     }
     gpu.close().unwrap();
@@ -144,10 +164,25 @@ fn without_trees_there_is_no_forest() {
 /// Passes and pipelines that draw trees one by one.
 fn tree_drawing(rasterizer: Rasterizer) -> (&'static [&'static str], &'static [&'static str]) {
     match rasterizer {
-        Rasterizer::Graphics => (&["trees"], &["trees", "trees magnified", "trees small", "trees converged"]),
+        Rasterizer::Graphics => {
+            (&[pass::TREES], &[pipeline::TREES, pipeline::MAGNIFIED, pipeline::SMALL, pipeline::CONVERGED])
+        }
         Rasterizer::Tiles => (
-            &["tree order", "tree sights", "list counts", "tile lists", "tiles", "tree light"],
-            &["tree order", "tree sights", "tile lists", "tiles", "tree light", "trees seen", "list entries"],
+            &[
+                pass::TREE_ORDER,
+                pass::TREE_SIGHTS,
+                pass::LIST_COUNTS,
+                pass::TILE_LISTS,
+                pass::TILES,
+                pass::TREE_LIGHT,
+            ],
+            &[
+                pipeline::TREE_ORDER,
+                pipeline::TREE_SIGHTS,
+                pipeline::TILE_LISTS,
+                pipeline::TILES,
+                pipeline::TREE_LIGHT,
+            ],
         ),
     }
 }
@@ -158,7 +193,15 @@ fn without_trees(rasterizer: Rasterizer) {
     let forest = draw(&gpu, &scene, rasterizer);
     let (passes, pipelines) = tree_drawing(rasterizer);
     let tree_passes = [
-        &["seeds", "coverage tiles", "cull", "prefix sums", "draw commands", "compact", "shader-map"][..],
+        &[
+            pass::SEEDS,
+            pass::COVERAGE,
+            pass::CULL,
+            pass::SUMS,
+            pass::COMMANDS,
+            pass::COMPACT,
+            pass::SHADER_MAP,
+        ][..],
         passes,
     ]
     .concat();
@@ -171,7 +214,7 @@ fn without_trees(rasterizer: Rasterizer) {
         "trees and lists",
         "pair tables of a",
         "view tables of a",
-        "light ray of trees",
+        pipeline::LIGHT_RAY,
         "shader-map nodes",
     ];
     let tree_items = [&tree_items[..], pipelines].concat();
@@ -191,20 +234,20 @@ fn without_trees(rasterizer: Rasterizer) {
             assert!(!bare.pipelines.iter().any(tiles), "{:?}", bare.pipelines);
         }
         let names = [
-            "seeds",
-            "trees",
-            "z-field views",
-            "coverage tiles",
-            "coverage sums",
-            "pair tables",
-            "view tables",
-            "shader-map nodes",
+            resource::SEEDS,
+            resource::TREES,
+            resource::VIEWS,
+            resource::COVERAGE,
+            resource::COVERAGE_SUMS,
+            resource::PAIR_TABLES,
+            resource::VIEW_TABLES,
+            resource::NODES,
         ];
         for name in names {
             assert!(forest.bytes(name) > 0, "{name}");
             assert_eq!(bare.bytes(name), 0, "{name}");
         }
-        assert!(bare.draws("shadows"), "the ground still casts");
+        assert!(bare.draws(pass::SHADOWS), "the ground still casts");
     }
     gpu.close().unwrap();
 }
@@ -219,7 +262,7 @@ fn a_listed_forest_needs_no_pattern_and_a_plain_no_height_map() {
     let tree = canopy::scene::TreePosition { x: 150.0, y: 150.0, scale: None, rotation: None };
     scene.species[0].distribution = Distribution::Positions(vec![tree; 1].into());
     let listed = draw(&gpu, &scene);
-    assert!(!listed.has("point pattern") && listed.draws("seeds"));
+    assert!(!listed.has("point pattern") && listed.draws(pass::SEEDS));
     assert!(listed.has("density maps"), "how densely listed trees stand");
     let (width, height) = (11, 11);
     scene.terrain.heights = Some(canopy::physics::raster::Raster { width, height, samples: vec![1.0; 121] });
@@ -258,6 +301,53 @@ fn the_plan_knows_what_will_be_allocated() {
     gpu.close().unwrap();
 }
 
+/// A buffer or image whose allocation is not what a plan describes: smaller, or larger by more than drivers add.
+fn disagreement(described: &BTreeMap<&'static str, u64>, drawn: &Drawn) -> Option<String> {
+    // Rows, levels and layers are padded, most where an image has few texels a row.
+    let fits = |wanted: u64, has: u64| has >= wanted && has <= wanted + wanted / 10 + (1 << 16);
+    let wrong = described.iter().find(|(name, bytes)| !fits(**bytes, drawn.bytes(name)));
+    wrong.map(|(name, bytes)| format!("{name}: {bytes} planned, {} allocated", drawn.bytes(name)))
+}
+
+#[test]
+fn every_allocation_is_the_one_that_its_item_describes_and_a_false_one_is_refused() {
+    let gpu = device::open();
+    let mut scene = scene();
+    scene.settings.set("transfer_bands", 2.0).unwrap();
+    for rasterizer in RASTERIZERS {
+        let plan = planned(&gpu, &scene, rasterizer);
+        let (drawn, _) = drawn(&gpu, &scene, plan.clone());
+        assert!(drawn.described.len() > 20, "{:?}", drawn.described);
+        assert_eq!(disagreement(&drawn.described, &drawn), None);
+        // The check can fail: on any item that is told to have half of its bytes, or twice as many.
+        for name in drawn.described.keys().filter(|n| drawn.described[*n] > 1 << 18) {
+            for wrong in [drawn.described[name] / 2, 2 * drawn.described[name]] {
+                let mut false_plan = drawn.described.clone();
+                false_plan.insert(name, wrong);
+                let found = disagreement(&false_plan, &drawn).unwrap_or_default();
+                assert!(found.starts_with(name), "{name}: {wrong} bytes: {found}");
+            }
+        }
+        // And nothing is drawn by a plan that describes other things than its numbers ask for.
+        for k in (0..plan.items.len()).filter(|k| !plan.items[*k].allocations.is_empty()) {
+            let mut false_plan = plan.clone();
+            match &mut false_plan.items[k].allocations[0] {
+                Description::Buffer(d) => d.bytes += 16,
+                Description::Image(d) => d.layers += 1,
+                Description::Volume(d) => d.size[2] += 1,
+            }
+            let refused =
+                Renderer::new(&gpu, Arc::new(scene.clone()), false_plan, &device::bake(&scene)).err();
+            let name = &plan.items[k].name;
+            assert!(
+                matches!(&refused, Some(Error::Usage(text)) if text.contains(name.as_str())),
+                "{name}: {refused:?}"
+            );
+        }
+    }
+    gpu.close().unwrap();
+}
+
 #[test]
 fn each_rasterizer_needs_nothing_of_the_other() {
     let gpu = device::open();
@@ -283,12 +373,12 @@ fn each_rasterizer_needs_nothing_of_the_other() {
         let plan = plan(Rasterizer::Tiles);
         for buffer in TileBuffers::new(&plan).all() {
             // To the next 16 bytes, and the padding of allocations.
-            let bytes = tiles.bytes(buffer.name);
-            assert!(bytes >= buffer.bytes && bytes < buffer.bytes + 4096, "{buffer:?}: {bytes}");
-            assert_eq!(graphics.bytes(buffer.name), 0, "{}", buffer.name);
+            let (bytes, wanted) = (tiles.bytes(buffer.desc.name), buffer.desc.bytes);
+            assert!(bytes >= wanted && bytes < wanted + 4096, "{buffer:?}: {bytes}");
+            assert_eq!(graphics.bytes(buffer.desc.name), 0, "{}", buffer.desc.name);
         }
-        let [with, without] =
-            [&tiles, &graphics].map(|d| ["quads seen", "first depth"].map(|n| d.bytes(n) > 0));
+        let [with, without] = [&tiles, &graphics]
+            .map(|d| [resource::QUADS_SEEN, resource::FIRST_DEPTH].map(|n| d.bytes(n) > 0));
         assert_eq!((with, without), ([true, layers], [false, false]));
         // A colour a pixel, not a sample.
         let colour = if layers { "sun part" } else { "radiance" };
@@ -313,8 +403,10 @@ fn tiles_that_a_device_cannot_hold_are_refused_and_not_chosen() {
     info.kind = "cpu";
     let trees = plan(Drawing::default(), &info).unwrap().tree_capacity;
     // The lists have three million entries; a record of a tree has eight texels.
-    let needed =
-        TileBuffers::new(&plan(Drawing::default(), &info).unwrap()).all().map(|b| b.bytes / b.texel.max(4));
+    let needed = TileBuffers::new(&plan(Drawing::default(), &info).unwrap()).all().map(|b| {
+        let texel = b.desc.texels.map_or(4, |(_, bytes)| bytes);
+        b.desc.bytes / texel
+    });
     let needed = needed.into_iter().max().unwrap() as u32;
     assert!(needed >= 8 * trees);
     info.max_texel_elements = needed;
@@ -352,15 +444,15 @@ fn without_sunlight(gpu: &Gpu, mut scene: Scene, rasterizer: Rasterizer) {
     let (day, _) = drawn(gpu, &scene, unreduced.clone());
     let (passes, pipelines) = tree_drawing(rasterizer);
     let has_trees = |d: &Drawn| passes.iter().all(|p| d.draws(p)) && pipelines.iter().all(|p| d.has(p));
-    assert!(day.has("light transfer of a") && day.bytes("light transfer") > 30_000);
-    assert!(day.has("light ray of trees") && day.has("pair tables of a") && has_trees(&day));
+    assert!(day.has("light transfer of a") && day.bytes(resource::TRANSFER) > 30_000);
+    assert!(day.has(pipeline::LIGHT_RAY) && day.has("pair tables of a") && has_trees(&day));
     scene.sun.irradiance = [0.0; 3];
     let (overcast, reduced) = drawn(gpu, &scene, planned(gpu, &scene, rasterizer));
-    assert!(!overcast.has("light ray of trees") && !overcast.has("pair tables of a"));
+    assert!(!overcast.has(pipeline::LIGHT_RAY) && !overcast.has("pair tables of a"));
     assert!(overcast.has("view tables of a") && has_trees(&overcast));
     // One texel a band stands for the transfer that nobody reads, and two for the tables.
-    assert!(!overcast.has("light transfer of a") && overcast.bytes("light transfer") < 1 << 14);
-    let [with, without] = [&day, &overcast].map(|d| d.bytes("pair tables"));
+    assert!(!overcast.has("light transfer of a") && overcast.bytes(resource::TRANSFER) < 1 << 14);
+    let [with, without] = [&day, &overcast].map(|d| d.bytes(resource::PAIR_TABLES));
     assert!(without <= 1024 && with >= 6 * 6 * 18 * 8, "{with} {without}");
     assert!(overcast.planned < day.planned);
     assert!(reduced.linear.as_ref().unwrap().coverage.iter().any(|c| *c > 0.5), "no tree is seen");
@@ -371,17 +463,17 @@ fn without_sunlight(gpu: &Gpu, mut scene: Scene, rasterizer: Rasterizer) {
 fn level_ground_is_one_tile_without_slopes() {
     let gpu = device::open();
     let mut scene = scene();
-    let plan = planned(&gpu, &scene, Representation::Auto);
+    let plan = planned(&gpu, &scene, Ladder::AUTO);
     assert!(plan.terrain_tiles > 1 && plan.height_tiles == 1);
     let (level, reduced) = drawn(&gpu, &scene, plan.clone());
-    assert!(!level.draws("terrain tiles") && !level.has("height map"));
+    assert!(!level.draws(pass::TERRAIN_TILES) && !level.has("height map"));
     assert!(!level.builds("forest/terrain_tile.comp"), "{:?}", level.pipelines);
     assert!(reduced == picture(&gpu, &scene, Plan { height_tiles: plan.terrain_tiles, ..plan }));
     hills(&mut scene);
     let relief = draw(&gpu, &scene, Rasterizer::Tiles);
-    assert!(relief.draws("terrain tiles") && relief.has("height map"));
+    assert!(relief.draws(pass::TERRAIN_TILES) && relief.has("height map"));
     assert!(relief.builds("forest/terrain_tile.comp"), "{:?}", relief.pipelines);
-    for name in ["slope tiles", "height tiles"] {
+    for name in [resource::SLOPE_TILES, resource::HEIGHT_TILES] {
         assert!(level.bytes(name) > 0 && relief.bytes(name) > 500 * level.bytes(name), "{name}");
     }
     gpu.close().unwrap();
@@ -411,11 +503,12 @@ fn from_afar_no_tree_is_drawn_by_itself() {
         let (with, _) = drawn(&gpu, &scene, planned(&gpu, &scene, rasterizer));
         let (passes, pipelines) = tree_drawing(rasterizer);
         for item in
-            ["seeds", "z-field views of a", "trees and lists", "light ray of trees"].iter().chain(pipelines)
+            ["seeds", "z-field views of a", "trees and lists", pipeline::LIGHT_RAY].iter().chain(pipelines)
         {
             assert!(with.has(item) && !without.has(item), "{item}");
         }
-        for pass in ["seeds", "cull", "prefix sums", "draw commands", "compact"].iter().chain(passes) {
+        for pass in [pass::SEEDS, pass::CULL, pass::SUMS, pass::COMMANDS, pass::COMPACT].iter().chain(passes)
+        {
             assert!(with.draws(pass) && !without.draws(pass), "{pass}");
         }
         let tree_shader = match rasterizer {
@@ -451,22 +544,98 @@ fn a_chosen_representation_needs_nothing_of_the_other() {
 fn one_representation(rasterizer: Rasterizer) {
     let gpu = device::open();
     let scene = scene();
-    let how = |representation| Drawing { representation, rasterizer: Some(rasterizer) };
+    let how = |ladder| Drawing { ladder: Some(ladder), rasterizer: Some(rasterizer) };
     let shown = tree_drawing(rasterizer).0[0];
-    let auto = planned(&gpu, &scene, how(Representation::Auto));
+    let auto = planned(&gpu, &scene, how(Ladder::AUTO));
     assert!(auto.z_fields && auto.pair_tables);
+    assert!(!auto.ladder.to_string().is_empty() && auto.convergence > 0.0 && auto.cascades > 0);
     // Trees at any distance never converge to an average.
-    let plan = planned(&gpu, &scene, how(Representation::ZField));
+    let plan = planned(&gpu, &scene, how(Ladder::ZFIELD));
     let (trees, reduced) = drawn(&gpu, &scene, plan.clone());
-    assert!(trees.draws(shown) && !trees.has("pair tables of a") && trees.bytes("pair tables") <= 1024);
+    assert!(
+        trees.draws(shown) && !trees.has("pair tables of a") && trees.bytes(resource::PAIR_TABLES) <= 1024
+    );
     assert!(reduced == picture(&gpu, &scene, Plan { pair_tables: true, ..plan }));
     // No tree stands by itself where the shader-map shows all.
-    let plan = planned(&gpu, &scene, how(Representation::ShaderMap));
+    let plan = planned(&gpu, &scene, how(Ladder::SHADER_MAP));
     let (map, reduced) = drawn(&gpu, &scene, plan.clone());
     assert!(map.has("pair tables of a") && !map.has("seeds") && !map.draws(shown));
+    // Average light includes its shadows.
+    assert!(plan.sun && !map.draws(pass::SHADOWS) && map.bytes(resource::CASCADES) < 1 << 16);
+    let Plan { cascades, shadow_distance, .. } = auto;
+    assert!(reduced == picture(&gpu, &scene, Plan { cascades, shadow_distance, ..plan.clone() }));
     let Plan { seed_regions, tree_capacity, shadow_quads, caster_capacity, .. } = auto;
     let near = Plan { z_fields: true, seed_regions, tree_capacity, shadow_quads, caster_capacity, ..plan };
     assert!(reduced == picture(&gpu, &scene, near));
+    // Where no tree is near enough to be drawn by itself, it is what the usual ladder shows.
+    let mut far = scene.clone();
+    far.cameras[0].position = [150.0, -9000.0, 5000.0];
+    far.cameras[0].vertical_fov = 3.0;
+    far.settings.set("zfield_min_pixels", 3.0).unwrap();
+    let [auto, map] = [Ladder::AUTO, Ladder::SHADER_MAP].map(|l| planned(&gpu, &far, how(l)));
+    assert!(!auto.z_fields && !map.z_fields);
+    assert!(picture(&gpu, &far, auto) == picture(&gpu, &far, map));
+    gpu.close().unwrap();
+}
+
+/// The distance that a plan draws trees to is what its ladder needs, and no number that stands for none or for all.
+#[test]
+fn a_ladder_says_how_far_trees_are_drawn_one_by_one() {
+    let mut scene = scene();
+    hills(&mut scene);
+    let plan = |scene: &Scene, how: Drawing| {
+        let eye = Eye::new(&scene.cameras[0], &scene.terrain, SIZE);
+        Plan::for_eye(scene, &eye, false, how, None).unwrap()
+    };
+    let of = |text: &str| plan(&scene, text.parse::<Ladder>().unwrap().into());
+    let (eight, four) = (of("zfield:8,shader-map"), of("zfield:4,shader-map"));
+    assert!(four.range == 2.0 * eight.range && four.silhouette_ratio == 0.5 * eight.silhouette_ratio);
+    assert_eq!(four.last_range(), eight.last_range(), "silhouettes have a knob of their own");
+    // A scene's own ladder is as one that is asked for, and the knob is where neither says.
+    scene.ladder = "zfield:8,shader-map".parse().unwrap();
+    assert_eq!(plan(&scene, Drawing::default()).items, eight.items);
+    scene.settings.set("zfield_min_pixels", 8.0).unwrap();
+    assert_eq!(plan(&scene, Ladder::AUTO.into()).ladder, eight.ladder);
+
+    let alone = plan(&scene, Ladder::ZFIELD.into());
+    let diagonal = scene.terrain.extent[0].hypot(scene.terrain.extent[1]);
+    assert!(alone.range > diagonal && alone.range < 2.0 * diagonal, "{}", alone.range);
+    assert!(alone.convergence == 0.0 && !alone.pair_tables && alone.silhouette_ratio == 1.0);
+    assert!(alone.draw_limits.is_sorted() && alone.draw_limits[2] >= alone.range, "{:?}", alone.draw_limits);
+    assert!(alone.shadow_distance > diagonal && alone.cascades > 0);
+    // From farther away, farther.
+    let far = scene.cameras[0].position.map(|p| p - 2000.0);
+    let eye = Eye::new(&scene.cameras[0], &scene.terrain, SIZE);
+    let both = Plan::for_path(&scene, &eye, &[far], false, Ladder::ZFIELD, None).unwrap();
+    assert!(both.range > 3000.0 && both.range < 6000.0, "{}", both.range);
+
+    let map = plan(&scene, Ladder::SHADER_MAP.into());
+    assert!(
+        map.convergence > 0.0
+            && map.range == 0.0
+            && map.species_range == [0.0]
+            && map.forest
+            && !map.z_fields
+    );
+    assert!(map.sun && map.pair_tables && map.cascades == 0);
+    // Bare ground between far trees is in the shadow of hills as far as the user says.
+    scene.settings.set("shadow_distance", 500.0).unwrap();
+    let shaded = plan(&scene, Ladder::SHADER_MAP.into());
+    assert!(shaded.cascades > 0 && shaded.shadow_distance == 500.0);
+}
+
+#[test]
+fn z_fields_alone_are_planned_again_for_a_camera_that_is_farther_away() {
+    let gpu = device::open();
+    let scene = scene();
+    let plan = planned(&gpu, &scene, Ladder::ZFIELD);
+    let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), plan, &device::bake(&scene)).unwrap();
+    let near = &scene.cameras[0];
+    let away = Camera { position: [150.0, -3000.0, 900.0], ..near.clone() };
+    let refused = renderer.render(&away, 1.0).unwrap_err();
+    assert!(matches!(&refused, Error::Usage(text) if text.contains("plan again")), "{refused}");
+    assert!(renderer.render(near, 1.0).unwrap().trees.camera > 100);
+    drop(renderer);
     gpu.close().unwrap();
 }
 
@@ -474,18 +643,20 @@ fn one_representation(rasterizer: Rasterizer) {
 fn one_species_has_one_density() {
     let gpu = device::open();
     let mut scene = scene();
-    let plan = planned(&gpu, &scene, Representation::Auto);
+    let plan = planned(&gpu, &scene, Ladder::AUTO);
     assert_eq!((plan.cover_channels, plan.cover_layers()), (2, 1));
     let (two, reduced) = drawn(&gpu, &scene, plan.clone());
-    let (four, whole) = drawn(&gpu, &scene, Plan { cover_channels: 4, ..plan });
-    let [two, four] = [two, four].map(|d| d.bytes("coverage tiles"));
+    let mut four = Plan { cover_channels: 4, ..plan };
+    four.list(&scene);
+    let (four, whole) = drawn(&gpu, &scene, four);
+    let [two, four] = [two, four].map(|d| d.bytes(resource::COVERAGE));
     // But for the padding of allocations.
     assert!(four.abs_diff(2 * two) < four / 50, "{two} {four}");
     assert!(reduced == whole);
     let one = scene.species[0].clone();
     for (count, layers) in [(3, 1), (4, 2), (8, 3)] {
         scene.species = vec![one.clone(); count];
-        let plan = planned(&gpu, &scene, Representation::Auto);
+        let plan = planned(&gpu, &scene, Ladder::AUTO);
         assert_eq!((plan.cover_channels, plan.cover_layers()), (4 * layers, layers), "{count} species");
     }
     gpu.close().unwrap();

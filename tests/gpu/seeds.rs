@@ -286,6 +286,7 @@ fn a_quad_has_the_same_seeds_when_it_is_produced_again() {
     let here = device::camera([300.0, 300.0, 20.0], [350.0, 350.0, 0.0]);
     let mut plan = Plan::new(&scene, &here, SIZE, false, Some(gpu.info())).unwrap();
     plan.seed_regions = 20;
+    plan.list(&scene);
     let baked = device::bake(&scene);
     let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), plan, &baked).unwrap();
     let mut visit = |camera: &Camera| {

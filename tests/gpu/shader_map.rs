@@ -6,11 +6,12 @@ use canopy::frame::Renderer;
 use canopy::gpu::Gpu;
 use canopy::gpu::interface::Species;
 use canopy::image::Linear;
+use canopy::ladder::Ladder;
 use canopy::measure::reflectance::{Method, Request, measure};
 use canopy::physics::raster::Raster;
 use canopy::physics::tables::ForestTables;
 use canopy::physics::{light, tables};
-use canopy::plan::{Plan, Representation};
+use canopy::plan::Plan;
 use canopy::scene::{Distribution, Scene, TreePosition};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -56,7 +57,7 @@ fn eye(scene: &Scene, (zenith, azimuth): (f64, f64), distance: f64, width: f64) 
     Eye::looking([0, 1, 2].map(|k| target[k] + distance * v[k]), v.map(|c| -c), fov, SIZE)
 }
 
-fn renderer(gpu: &Gpu, scene: &Scene, eye: &Eye, how: Representation) -> Renderer {
+fn renderer(gpu: &Gpu, scene: &Scene, eye: &Eye, how: Ladder) -> Renderer {
     let plan = Plan::for_eye(scene, eye, true, how, Some(gpu.info())).unwrap();
     Renderer::new(gpu, Arc::new(scene.clone()), plan, &device::bake(scene)).unwrap()
 }
@@ -129,7 +130,7 @@ fn a_forest_far_away_is_what_the_tables_say() {
         scene.settings.set("samples", 1.0).unwrap();
         let tables = device::bake(&scene)[0].tables.clone();
         let above = eye(&scene, (0.0, 0.0), 30_000.0, 200.0);
-        let mut renderer = renderer(&gpu, &scene, &above, Representation::ShaderMap);
+        let mut renderer = renderer(&gpu, &scene, &above, Ladder::SHADER_MAP);
         let row = renderer.forest().unwrap().species.rows[0];
         let n = [0.0, -slope.to_radians().sin(), slope.to_radians().cos()];
         for (zenith, azimuth) in
@@ -193,12 +194,12 @@ fn fractions_are_shares_of_a_pixel_at_every_distance() {
     let gpu = device::open();
     let scene = plain(0.03, 40.0, 0.0);
     let mut shown = Vec::new();
-    for how in [Representation::Auto, Representation::ZField, Representation::ShaderMap] {
+    for how in [Ladder::AUTO, Ladder::ZFIELD, Ladder::SHADER_MAP] {
         let eyes = [60.0, 140.0, 170.0, 600.0].map(|d| eye(&scene, (35.0, 60.0), d, d));
         let mut renderer = renderer(&gpu, &scene, &eyes[0], how);
         let range = renderer.plan().range;
         // Trees of a pixel, all of them drawn, are many.
-        for eye in &eyes[..if how == Representation::ZField { 2 } else { 4 }] {
+        for eye in &eyes[..if how == Ladder::ZFIELD { 2 } else { 4 }] {
             let (report, _) = renderer.render_eye(eye, 1.0).unwrap();
             let l = renderer.picture().unwrap().linear.unwrap();
             let (mut mean, relative) = ([0.0; 4], eye.position[2] / 35f64.to_radians().cos() / range);
@@ -232,7 +233,7 @@ fn where_a_crown_is_no_ground_shows() {
     let list = places.iter().map(|p| TreePosition { x: p[0], y: p[1], scale: Some(3.0), rotation: None });
     scene.species[0].distribution = Distribution::Positions(Arc::new(list.collect()));
     let eye = Eye::looking([50.0, -20.0, 90.0], [0.0, 0.7, -0.9], 20.0, SIZE);
-    let mut renderer = renderer(&gpu, &scene, &eye, Representation::ShaderMap);
+    let mut renderer = renderer(&gpu, &scene, &eye, Ladder::SHADER_MAP);
     renderer.render_eye(&eye, 1.0).unwrap();
     let l = renderer.picture().unwrap().linear.unwrap();
     let radius = 3.0 * f64::from(renderer.forest().unwrap().species.rows[0].crown_radius);
@@ -282,11 +283,11 @@ fn steep() -> Scene {
 fn no_light_angle_or_slope_breaks_a_far_forest() {
     let gpu = device::open();
     let all = [
-        (Representation::Auto, 90.0),
-        (Representation::ShaderMap, 50.0),
-        (Representation::Auto, 0.5),
-        (Representation::ShaderMap, 0.0),
-        (Representation::Auto, -5.0),
+        (Ladder::AUTO, 90.0),
+        (Ladder::SHADER_MAP, 50.0),
+        (Ladder::AUTO, 0.5),
+        (Ladder::SHADER_MAP, 0.0),
+        (Ladder::AUTO, -5.0),
     ];
     for (what, mut scene, cases) in
         [("steep", steep(), &all[..]), ("level", plain(0.05, 50.0, 0.0), &all[1..3])]
@@ -350,7 +351,7 @@ fn near_and_far_forests_are_equally_bright() {
             sun_zenith: 40.0,
             slope: 0.0,
             distance: relative * plan.range,
-            drawing: Representation::Auto.into(),
+            drawing: Ladder::AUTO.into(),
             views: vec![[0.0, 0.0], [40.0, 0.0], [-40.0, 0.0], [30.0, 90.0]],
         };
         measure(&gpu, &scene, &[density], &baked, (&camera, SIZE), &method, &request, &mut || ()).unwrap()

@@ -293,7 +293,8 @@ fn quads_are_dropped_from_the_far_end_when_regions_are_few() {
     let eye = Eye::new(&camera, &scene.terrain, SIZE);
     let baked = device::bake(&scene);
     let full = Plan::new(&scene, &camera, SIZE, false, Some(gpu.info())).unwrap();
-    let draw = |plan: Plan| {
+    let draw = |mut plan: Plan| {
+        plan.list(&scene);
         let mut renderer = Renderer::new(&gpu, scene.clone().into(), plan, &baked).unwrap();
         let (report, _) = renderer.render_eye(&eye, 1.0).unwrap();
         (report.seed_quads, report.trees.camera)
@@ -305,8 +306,8 @@ fn quads_are_dropped_from_the_far_end_when_regions_are_few() {
     assert!(quads > near + 1 && most > fewest, "{near} {quads}");
     let mut few = full;
     // Those for quads that only cast are not the camera's.
-    few.shadow_quads = 8;
-    few.seed_regions = near + 1 + few.shadow_quads;
+    (few.shadow_quads, few.silhouette_quads) = (8, 1);
+    few.seed_regions = near + few.silhouette_quads + few.shadow_quads;
     let (quads, some) = draw(few);
     assert!(quads == near + 1 && some < most && some >= fewest, "{quads} {fewest} {some} {most}");
     gpu.close().unwrap();

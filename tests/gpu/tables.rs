@@ -6,6 +6,7 @@ use canopy::gpu::{Resource, Sampler, shaders};
 use canopy::physics::hash::Stream;
 use canopy::physics::tables;
 use canopy::physics::tables::ForestTables;
+use canopy::plan::tables as described_tables;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -185,7 +186,8 @@ fn lookups_are_those_of_the_oracle_within_half_floats_and_filters() {
     let gpu = device::open();
     for (n, m) in [(4, 2), (5, 3), (16, 8)] {
         let all: Vec<ForestTables> = (0..3).map(|k| random(7 + k, (n, m), 0.5 + k as f32)).collect();
-        let data = TableData::new(&gpu, &all.iter().collect::<Vec<_>>(), true).unwrap();
+        let (pairs, views) = described_tables(3, n, m);
+        let data = TableData::new(&gpu, (Some(pairs), &views), &all.iter().collect::<Vec<_>>()).unwrap();
         let mut stream = Stream::new(n);
         let mut cases = Vec::new();
         for k in 0..4000u32 {

@@ -7,7 +7,8 @@ use canopy::camera::{Eye, auto_exposure};
 use canopy::frame::{FrameReport, Renderer};
 use canopy::gpu::Gpu;
 use canopy::image::{Linear, Picture};
-use canopy::plan::{Drawing, Plan, Rasterizer, Representation};
+use canopy::ladder::Ladder;
+use canopy::plan::{Drawing, Plan, Rasterizer};
 use canopy::scene::Scene;
 
 /// Two species on a plain, with light.
@@ -108,7 +109,7 @@ fn long_lists_are_gone_through_to_the_end_and_without_lists_all_trees_are() {
     scene.cameras[0].position = [-40.0, 450.0, 16.0];
     scene.cameras[0].target = [450.0, 450.0, 12.0];
     let size = [24, 16];
-    let far = |rasterizer| Drawing { representation: Representation::ZField, rasterizer: Some(rasterizer) };
+    let far = |rasterizer| Drawing { ladder: Some(Ladder::ZFIELD), rasterizer: Some(rasterizer) };
     let tiled = plan(&gpu, &scene, size, true, far(Rasterizer::Tiles));
     let (report, tiles) = draw(&gpu, &scene, tiled.clone()).unwrap();
     // Six lists, and every tree in view is in one at least.
@@ -117,7 +118,9 @@ fn long_lists_are_gone_through_to_the_end_and_without_lists_all_trees_are() {
         draw(&gpu, &scene, plan(&gpu, &scene, size, true, far(Rasterizer::Graphics))).unwrap();
     agree(&graphics, &tiles, "lists of several parts");
     for tile_steps in [0, report.trees.camera] {
-        let (_, whole) = draw(&gpu, &scene, Plan { tile_steps, ..tiled.clone() }).unwrap();
+        let mut short = Plan { tile_steps, ..tiled.clone() };
+        short.list(&scene);
+        let (_, whole) = draw(&gpu, &scene, short).unwrap();
         assert!(whole == tiles, "with room for {tile_steps} steps other bits are drawn");
     }
     gpu.close().unwrap();

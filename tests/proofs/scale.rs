@@ -1,7 +1,7 @@
 //! The same radiance at every distance (BN12, figure 7), and its dependence on the view (figure 8).
 
+use canopy::ladder::Ladder;
 use canopy::measure::reflectance::{Method, Request, measure};
-use canopy::plan::Representation;
 
 use crate::{device, folder, luminance, oaks, plot};
 
@@ -30,7 +30,7 @@ fn radiance_does_not_depend_on_distance() {
                     sun_zenith,
                     slope: 0.0,
                     distance,
-                    drawing: Representation::Auto.into(),
+                    drawing: Ladder::AUTO.into(),
                     views: views.clone(),
                 };
                 let camera = (&scene.cameras[0], SIZE);
@@ -84,7 +84,7 @@ fn the_principal_plane_is_a_bowl_with_a_hotspot() {
             sun_zenith: 60.0,
             slope: 0.0,
             distance,
-            drawing: Representation::Auto.into(),
+            drawing: Ladder::AUTO.into(),
             views: views.clone(),
         };
         let camera = (&scene.cameras[0], SIZE);

@@ -32,7 +32,7 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         TableForest t = table_forest(pair_table, view_table, v, view.v.sun_direction, n, s.vertical_scale, x, s.max_thickness,
                                      float(k), TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES);
         vec2 g = table_ground(view_table, table_density(x, s.max_thickness, TABLE_DENSITIES), float(k), TABLE_ANGLES, TABLE_DENSITIES);
-        float path = share * t.seen, relative = distance / s.range, part = path * handed_over(relative);
+        float path = share * t.seen, relative = relative_distance(distance, s.range), part = path * handed_over(relative);
         f.seen += path;
         f.over += part;
         f.converged += path * converged(relative, view.v.convergence);

@@ -1,4 +1,4 @@
-//! Trees in a frame, one file a representation.
+//! Trees in a frame, one file a rung of the ladder, and the tile rasteriser.
 
 pub mod shader_map;
 pub mod tiles;

@@ -3,11 +3,9 @@
 use crate::Result;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::frame::Forest;
-use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders, vk};
+use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
 use crate::plan::Plan;
-
-/// Format and bytes of the texels as which nodes are read.
-pub const NODE_TEXELS: (vk::Format, u64) = (vk::Format::R32G32B32A32_SFLOAT, 16);
+use crate::plan::names::{pass, resource};
 
 /// Nodes of every terrain quad in view, and what computes them.
 pub struct ShaderMap {
@@ -24,7 +22,7 @@ impl ShaderMap {
     pub fn new(gpu: &Gpu, plan: &Plan, forest: &Forest) -> Result<Self> {
         let float = |n: u32| (n as f32).to_bits();
         Ok(ShaderMap {
-            nodes: gpu.texel_buffer("shader-map nodes", plan.node_bytes(), NODE_TEXELS)?,
+            nodes: gpu.described_buffer(&plan.buffer(resource::NODES))?,
             program: gpu.compute(
                 &shaders::FRAME_TREES_SHADER_MAP_COMP,
                 &[
@@ -49,7 +47,7 @@ impl ShaderMap {
         if draws.camera.1 == 0 {
             return;
         }
-        recorder.compute("shader-map", |pass| {
+        recorder.compute(pass::SHADER_MAP, |pass| {
             pass.bind(
                 &self.program,
                 &[

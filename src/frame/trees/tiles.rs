@@ -14,14 +14,11 @@ use crate::forest::cull::CullData;
 use crate::frame::Forest;
 use crate::frame::targets::ImageTargets;
 use crate::gpu::interface::{BIN_LANES, DEPTH_BINS, ORDER_LANES, TILE_SIDE, TileParameters, TileState};
-use crate::gpu::{Buffer, Gpu, Image, Later, Program, Recorder, Resource, Sampler, Shader, shaders, vk};
+use crate::gpu::{Buffer, Gpu, Image, Later, Program, Recorder, Resource, Sampler, Shader, shaders};
+use crate::plan::names::pass;
 use crate::plan::{Plan, TileBuffer, TileBuffers};
 use crate::scene::Scene;
 use crate::{Error, Result};
-
-const WORD: (vk::Format, u64) = (vk::Format::R32_UINT, 4);
-const TWO_WORDS: (vk::Format, u64) = (vk::Format::R32G32_UINT, 8);
-const FOUR_WORDS: (vk::Format, u64) = (vk::Format::R32G32B32A32_UINT, 16);
 
 /// Buffers and programs of the tiles.
 pub struct TreeTiles {
@@ -61,12 +58,7 @@ impl TreeTiles {
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, mask_rows: u32) -> Result<Self> {
         let s = &scene.settings;
         let sizes = TileBuffers::new(plan);
-        let make = |b: &TileBuffer| match b.texel {
-            0 => gpu.buffer(b.name, b.bytes),
-            4 => gpu.texel_buffer(b.name, b.bytes, WORD),
-            8 => gpu.texel_buffer(b.name, b.bytes, TWO_WORDS),
-            _ => gpu.texel_buffer(b.name, b.bytes, FOUR_WORDS),
-        };
+        let make = |b: &TileBuffer| gpu.described_buffer(&plan.buffer(b.desc.name));
         let lists = sizes.lists;
         let resolution = (s.view_resolution as f32).to_bits();
         let before = s.view_iterations - 1;
@@ -122,8 +114,8 @@ impl TreeTiles {
                     ("SAMPLES", plan.samples),
                     ("ESTIMATES", before),
                     // Without sun no ray goes to it.
-                    ("LIGHT_ITERATIONS", if plan.cascades > 0 { s.light_iterations } else { 0 }),
-                    ("HAS_SUN", u32::from(plan.cascades > 0)),
+                    ("LIGHT_ITERATIONS", if plan.sun { s.light_iterations } else { 0 }),
+                    ("HAS_SUN", u32::from(plan.sun)),
                     ("TRANSFER_BANDS", plan.transfer_bands),
                     ("VIEW_MODE", plan.view_mode as u32),
                 ],
@@ -157,7 +149,7 @@ impl TreeTiles {
             ("depths", Resource::Buffer(&self.depths)),
             ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
         ];
-        recorder.compute("tree order", |pass| {
+        recorder.compute(pass::TREE_ORDER, |pass| {
             let depth = with(
                 &all,
                 &[("counts", Resource::Buffer(&self.depth_counts)), ("trees", Resource::Buffer(&cull.trees))],
@@ -182,13 +174,13 @@ impl TreeTiles {
                 ("entries", Resource::Buffer(&self.entries)),
             ],
         );
-        recorder.compute("tree sights", |pass| {
+        recorder.compute(pass::TREE_SIGHTS, |pass| {
             pass.bind(&self.sight, &own);
             pass.push(p);
             pass.dispatch_indirect(&self.state, std::mem::offset_of!(TileState, tree_groups) as u64);
         });
-        recorder.fill("list counts", &self.list_counts, 0);
-        recorder.compute("tile lists", |pass| {
+        recorder.fill(pass::LIST_COUNTS, &self.list_counts, 0);
+        recorder.compute(pass::TILE_LISTS, |pass| {
             pass.bind(&self.scan, &with(&all, &[("sums", Resource::Buffer(&self.spans))]));
             pass.push(&0u32);
             pass.dispatch([1, 1, 1]);
@@ -206,7 +198,7 @@ impl TreeTiles {
             pass.dispatch([BIN_LANES / 8, 1, 1]);
         });
         let [across, down] = self.tiles;
-        recorder.compute("tiles", |pass| {
+        recorder.compute(pass::TILES, |pass| {
             let found = with(
                 &all,
                 &[
@@ -235,7 +227,7 @@ impl TreeTiles {
         targets: &ImageTargets,
     ) {
         let [across, down] = self.tiles;
-        recorder.compute("tree light", |pass| {
+        recorder.compute(pass::TREE_LIGHT, |pass| {
             let shown = targets.shown();
             let all = [
                 ("view", Resource::Buffer(view)),

@@ -9,6 +9,7 @@ use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, Layers, Program, Recorder, Resource, Sampler, Targets,
     shaders,
 };
+use crate::plan::names::pass;
 use crate::plan::{Plan, ViewMode};
 use crate::scene::Scene;
 
@@ -26,7 +27,7 @@ impl Trees {
     /// [`crate::Error::Device`] if the device fails.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, mask_rows: u32) -> Result<Self> {
         let s = &scene.settings;
-        let formats: Vec<_> = ImageTargets::formats(plan.layers).iter().map(|f| f.1).collect();
+        let formats = plan.color_formats();
         let before = s.view_iterations - 1;
         let program = |estimates: u32, magnified: bool, converged: bool| {
             let mut constants = vec![
@@ -36,8 +37,8 @@ impl Trees {
                 ("SAMPLES", plan.samples),
                 ("ESTIMATES", estimates),
                 // Without sun no ray goes to it.
-                ("LIGHT_ITERATIONS", if plan.cascades > 0 { s.light_iterations } else { 0 }),
-                ("HAS_SUN", u32::from(plan.cascades > 0)),
+                ("LIGHT_ITERATIONS", if plan.sun { s.light_iterations } else { 0 }),
+                ("HAS_SUN", u32::from(plan.sun)),
                 ("MAGNIFIED", u32::from(magnified)),
                 ("CONVERGED", u32::from(converged)),
                 ("TRANSFER_BANDS", plan.transfer_bands),
@@ -80,7 +81,7 @@ impl Trees {
     ) {
         let colors: Vec<_> = targets.colors.iter().map(|t| t.attachment(None, true)).collect();
         let depth = Some(targets.depth.attachment(None, true));
-        recorder.render("trees", &Targets { colors: &colors, depth, layers: Layers::One(0) }, |pass| {
+        recorder.render(pass::TREES, &Targets { colors: &colors, depth, layers: Layers::One(0) }, |pass| {
             if forest.seeds.visible == 0 {
                 return;
             }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::judge::{Row, fit, least_ms};
 use super::result::{Identity, Point, SweepResult};
+use crate::ladder::Ladder;
 use crate::measure::metrics::Estimate;
 use crate::measure::results::{DeviceIdentity, SceneIdentity};
 use crate::settings::Settings;
@@ -21,6 +22,14 @@ pub struct Subject {
     /// By which rasteriser, where one was chosen.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rasterizer: Option<String>,
+    /// By which ladder, where that is not the usual.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ladder: Option<String>,
+}
+
+/// A ladder as it is kept: not at all if it is the usual, as with results of before there was a choice.
+pub fn unusual(ladder: &Ladder) -> Option<String> {
+    (*ladder != Ladder::default()).then(|| ladder.to_string())
 }
 
 impl From<&Identity> for Subject {
@@ -30,6 +39,7 @@ impl From<&Identity> for Subject {
             size: i.size,
             device: i.device.clone(),
             rasterizer: i.rasterizer.clone(),
+            ladder: i.ladder.clone(),
         }
     }
 }
@@ -72,7 +82,7 @@ pub struct Choice {
     pub cpu: String,
     /// Device that it was measured on.
     pub device: String,
-    /// In what it differs from what is drawn now: `scene`, `device`, `rasterizer`; the time then says less.
+    /// In what it differs from what is drawn now: `scene`, `device`, `rasterizer`, `ladder`; the time then says less.
     pub differs: Vec<&'static str>,
     /// Every knob.
     #[serde(skip)]
@@ -101,6 +111,7 @@ pub fn choose(file: &Path, subject: &Subject, budget_ms: f64) -> Result<Choice> 
         ("scene", swept.scene != subject.scene),
         ("device", swept.device != subject.device),
         ("rasterizer", swept.rasterizer != subject.rasterizer),
+        ("ladder", swept.ladder != subject.ladder),
     ];
     let (point, row): (&Point, Row) = fit(&result, budget_ms).ok_or_else(|| {
         let least = least_ms(&result).map_or("nothing was measured".into(), |ms| format!("the fastest takes {ms:.1} ms"));

@@ -52,6 +52,9 @@ pub struct Identity {
     /// What finds the samples of trees, where it was chosen: `graphics` or `tiles`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rasterizer: Option<String>,
+    /// What stands for a tree, near to far, where that is not the usual.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ladder: Option<String>,
     /// Frames of each camera and setting that are timed, the first of which only warms up.
     pub rounds: u32,
     /// Which device.

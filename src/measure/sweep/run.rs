@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::design::{HOME, Setting, Swept, most_accurate, one_at_a_time, product};
 use super::judge;
+use super::kept::unusual;
 use super::result::{CameraError, Identity, Point, SWEEP_SCHEMA_VERSION, Sample, SweepResult, Time};
 use crate::camera::{Eye, auto_exposure};
 use crate::gpu::{Gpu, Stamps, TimingOptions};
@@ -154,6 +155,7 @@ fn empty(gpu: &Gpu, request: &Request, finest: &Settings) -> Result<SweepResult>
         most_accurate: finest.clone(),
         knobs: request.knobs.iter().map(Swept::label).collect(),
         rasterizer: request.rasterizer.map(|r| r.name().into()),
+        ladder: unusual(&request.scene.ladder),
         rounds: request.rounds,
         device: gpu.info().into(),
         cpu: (host.cpu.clone(), host.threads),

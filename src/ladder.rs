@@ -1,0 +1,323 @@
+//! The ladder: what stands for a tree, from near to far, and where one rung hands over to the next.
+//!
+//! A user writes it as `zfield:4,shader-map`: rungs, each with the apparent height of a tree in pixels down to which it is
+//! used, and the last without, because it goes on to the horizon. Where a rung says no height the knob does that is for it.
+//!
+//! Hand-overs are one band of the range (BN12, section 7): each tree fades over a tenth of its range at a time of its own, and what
+//! comes behind takes over as all do together. Its numbers stand once, in `shaders/interface.glsl`, with their law in
+//! [`crate::physics::handover`].
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::gpu::interface::{FADE_FIRST, FADE_RATE};
+use crate::settings::{KNOBS, Settings, nearest};
+
+/// One way to stand for a tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rung {
+    /// A quad a tree, which shows three of its depth views (BN12, section 5).
+    ZField,
+    /// A shader of the ground, for all trees together (BN12, section 6).
+    ShaderMap,
+}
+
+/// Number of rungs.
+const RUNGS: usize = 2;
+
+impl Rung {
+    /// All, near to far, with the names that users write.
+    pub const NAMES: [(&'static str, Rung); RUNGS] =
+        [("zfield", Rung::ZField), ("shader-map", Rung::ShaderMap)];
+
+    /// The name that users write.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(_, r)| *r == self).map_or("", |(n, _)| n)
+    }
+}
+
+/// A rung of a ladder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Step {
+    rung: Rung,
+    /// Apparent height of a tree down to which it is used, pixels; `None` for the last, and where the knob says it.
+    pixels: Option<f64>,
+}
+
+/// Rungs near to far. No rung stands twice, so there are at most as many steps as rungs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ladder {
+    steps: [Option<Step>; RUNGS],
+}
+
+impl Default for Ladder {
+    fn default() -> Self {
+        Ladder::AUTO
+    }
+}
+
+impl Ladder {
+    /// z-fields near, the shader-map far: what scenes have that say nothing.
+    pub const AUTO: Ladder = Ladder { steps: [step(Rung::ZField), step(Rung::ShaderMap)] };
+    /// z-fields at any distance.
+    pub const ZFIELD: Ladder = Ladder { steps: [step(Rung::ZField), None] };
+    /// The shader-map at any distance.
+    pub const SHADER_MAP: Ladder = Ladder { steps: [step(Rung::ShaderMap), None] };
+
+    /// Ladders that have a name of their own.
+    pub const SHORTHANDS: [(&'static str, Ladder); 3] =
+        [("auto", Ladder::AUTO), ("zfield", Ladder::ZFIELD), ("shader-map", Ladder::SHADER_MAP)];
+
+    /// Its name, if it has one, or itself as users write it.
+    pub fn name(&self) -> String {
+        let named = Self::SHORTHANDS.iter().find(|(_, ladder)| ladder == self);
+        named.map_or_else(|| self.to_string(), |(name, _)| name.to_string())
+    }
+
+    fn has(&self, rung: Rung) -> bool {
+        self.steps.iter().flatten().any(|s| s.rung == rung)
+    }
+
+    /// Whether a rung draws trees one by one.
+    pub fn draws_trees(&self) -> bool {
+        self.has(Rung::ZField)
+    }
+
+    /// Whether a rung shows the average of a forest.
+    pub fn averages(&self) -> bool {
+        self.has(Rung::ShaderMap)
+    }
+
+    /// Whether trees that are drawn one by one hand over to their average.
+    pub fn hands_over(&self) -> bool {
+        self.draws_trees() && self.averages()
+    }
+
+    /// The same with the heights that the knobs say written down.
+    pub fn resolved(mut self, settings: &Settings) -> Ladder {
+        let mut rest = self.steps.iter_mut().flatten().peekable();
+        while let Some(step) = rest.next() {
+            if rest.peek().is_some() {
+                step.pixels = step.pixels.or(Some(f64::from(settings.zfield_min_pixels)));
+            }
+        }
+        self
+    }
+
+    /// Apparent height under which trees are no longer drawn one by one, pixels; 0 where they always are.
+    pub fn least_pixels(&self, settings: &Settings) -> f64 {
+        self.resolved(settings).steps.iter().flatten().find_map(|s| s.pixels).unwrap_or(0.0)
+    }
+
+    /// Distance to which trees are drawn one by one that would be `pixels` high at one metre, m: to where they hand over, or, where
+    /// they do not, so far that those at the distance `farthest` have not begun to fade; 0 where none is.
+    pub fn range(&self, settings: &Settings, pixels: f64, farthest: f64) -> f64 {
+        match (self.draws_trees(), self.averages()) {
+            (false, _) => 0.0,
+            (true, true) => pixels / self.least_pixels(settings),
+            (true, false) => farthest / fade_begin(),
+        }
+    }
+
+    /// Distance to which every tree of a range is opaque, m.
+    pub fn opaque_to(&self, range: f64) -> f64 {
+        // Room for the rounding of one product and one quotient.
+        range * fade_begin() * (1.0 + 1e-9)
+    }
+}
+
+const fn step(rung: Rung) -> Option<Step> {
+    Some(Step { rung, pixels: None })
+}
+
+/// Part of its range to which every tree of a species is opaque, and nothing is handed over.
+fn fade_begin() -> f64 {
+    f64::from(FADE_FIRST) - 1.0 / f64::from(FADE_RATE)
+}
+
+impl fmt::Display for Ladder {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for (k, step) in self.steps.iter().flatten().enumerate() {
+            let comma = if k > 0 { "," } else { "" };
+            write!(f, "{comma}{}", step.rung.name())?;
+            step.pixels.map_or(Ok(()), |pixels| write!(f, ":{pixels}"))?;
+        }
+        Ok(())
+    }
+}
+
+impl serde::Serialize for Ladder {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// What is wrong with a ladder as it was written, and how to put it right.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LadderError {
+    /// Where, and what is wrong there.
+    pub what: String,
+    /// What to write instead.
+    pub remedy: String,
+}
+
+impl fmt::Display for LadderError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}; {}", self.what, self.remedy)
+    }
+}
+
+impl std::error::Error for LadderError {}
+
+/// The rungs by name, for messages.
+fn rung_names() -> String {
+    Rung::NAMES.map(|n| n.0).join(", ")
+}
+
+impl FromStr for Ladder {
+    type Err = LadderError;
+
+    fn from_str(text: &str) -> Result<Self, LadderError> {
+        let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+        let mut steps = [None; RUNGS];
+        let mut last: Option<Rung> = None;
+        for (k, part) in parts.iter().enumerate() {
+            let wrong = |what: String, remedy: String| LadderError {
+                what: format!("rung {} of \"{text}\": {what}", k + 1),
+                remedy,
+            };
+            let (name, pixels) =
+                part.split_once(':').map_or((*part, None), |(n, p)| (n.trim(), Some(p.trim())));
+            let rung = rung(name).map_err(|(what, remedy)| wrong(what, remedy))?;
+            if let Some(before) = last.filter(|before| *before as usize >= rung as usize) {
+                let what = format!("{name} after {}", before.name());
+                let remedy = format!("write each rung once, near to far: {}", rung_names());
+                return Err(wrong(what, remedy));
+            }
+            let pixels = match pixels {
+                Some(given) if k + 1 == parts.len() => {
+                    let what = "the last rung goes on to the horizon".to_string();
+                    return Err(wrong(what, format!("leave out \":{given}\", or write a rung behind it")));
+                }
+                Some(given) => Some(height(given).map_err(|(what, remedy)| wrong(what, remedy))?),
+                None => None,
+            };
+            // Rungs ascend, so there are no more than steps.
+            steps[k] = Some(Step { rung, pixels });
+            last = Some(rung);
+        }
+        Ok(Ladder { steps })
+    }
+}
+
+/// The rung of a name, or what is wrong and the remedy.
+fn rung(name: &str) -> Result<Rung, (String, String)> {
+    if let Some((_, rung)) = Rung::NAMES.iter().find(|(n, _)| *n == name) {
+        return Ok(*rung);
+    }
+    let what = if name.is_empty() { "no name".into() } else { format!("there is no rung \"{name}\"") };
+    let near = nearest(name, Rung::NAMES.iter().map(|n| n.0));
+    let hint = near.map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
+    Err((what, format!("{hint}the rungs are: {}", rung_names())))
+}
+
+/// An apparent height in pixels, in the range of the knob that it takes the place of.
+fn height(text: &str) -> Result<f64, (String, String)> {
+    let range = KNOBS.iter().find(|k| k.name == "zfield_min_pixels").map_or(0.0..=0.0, |k| k.min..=k.max);
+    match text.parse::<f64>() {
+        Ok(pixels) if range.contains(&pixels) => Ok(pixels),
+        _ => Err((
+            format!("\"{text}\" is no height that a rung is used down to"),
+            format!("write {} to {} pixels, such as zfield:4", range.start(), range.end()),
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::interface::{FADE_SPREAD, HANDOVER_FROM, HANDOVER_RATE};
+    use crate::physics::handover;
+
+    #[test]
+    fn what_is_printed_is_what_was_written() {
+        for text in
+            ["zfield:4,shader-map", "zfield:0.25,shader-map", "zfield,shader-map", "zfield", "shader-map"]
+        {
+            assert_eq!(text.parse::<Ladder>().unwrap().to_string(), text);
+        }
+        assert_eq!(
+            " zfield : 6.5 , shader-map ".parse::<Ladder>().unwrap().to_string(),
+            "zfield:6.5,shader-map"
+        );
+        for (name, ladder) in Ladder::SHORTHANDS {
+            assert_eq!(ladder.name(), name);
+            assert_eq!(ladder.to_string().parse::<Ladder>().unwrap(), ladder);
+        }
+        let four = "zfield:4,shader-map".parse::<Ladder>().unwrap();
+        assert_eq!(four.name(), "zfield:4,shader-map");
+        assert_eq!(serde_json::to_value(four).unwrap(), "zfield:4,shader-map");
+    }
+
+    #[test]
+    fn what_is_no_ladder_is_refused_with_the_place_and_a_remedy() {
+        for (text, what, remedy) in [
+            ("", "rung 1 of \"\": no name", "the rungs are: zfield, shader-map"),
+            ("mesh:256,zfield:4,shader-map", "rung 1 of", "the rungs are: zfield, shader-map"),
+            ("zfield:4,shells", "no rung \"shells\"", "the rungs are: zfield, shader-map"),
+            ("zfeild", "no rung \"zfeild\"", "did you mean \"zfield\"?"),
+            ("zfield:4", "the last rung goes on to the horizon", "leave out \":4\""),
+            ("zfield:4,shader-map:2", "rung 2 of", "leave out \":2\""),
+            ("zfield:four,shader-map", "\"four\" is no height", "0.25 to 64 pixels"),
+            ("zfield:0,shader-map", "\"0\" is no height", "0.25 to 64 pixels"),
+            ("zfield:nan,shader-map", "\"nan\" is no height", "0.25 to 64 pixels"),
+            ("zfield:,shader-map", "\"\" is no height", "0.25 to 64 pixels"),
+            (
+                "shader-map:4,zfield",
+                "rung 2 of \"shader-map:4,zfield\": zfield after shader-map",
+                "near to far",
+            ),
+            ("zfield:4,zfield", "zfield after zfield", "each rung once"),
+            ("zfield:4,", "rung 2 of \"zfield:4,\": no name", "the rungs are"),
+        ] {
+            let wrong = text.parse::<Ladder>().unwrap_err();
+            assert!(wrong.what.contains(what) && wrong.remedy.contains(remedy), "{text}: {wrong}");
+        }
+    }
+
+    #[test]
+    fn a_range_ends_where_trees_hand_over_or_beyond_the_last_tree() {
+        let mut settings = Settings::default();
+        settings.set("zfield_min_pixels", 5.0).unwrap();
+        let four: Ladder = "zfield:4,shader-map".parse().unwrap();
+        assert_eq!(four.range(&settings, 1000.0, 3000.0), 250.0);
+        assert_eq!(Ladder::AUTO.range(&settings, 1000.0, 3000.0), 200.0);
+        assert_eq!(Ladder::AUTO.resolved(&settings).to_string(), "zfield:5,shader-map");
+        assert_eq!(four.resolved(&settings), four);
+        assert_eq!(Ladder::SHADER_MAP.range(&settings, 1000.0, 3000.0), 0.0);
+        // The farthest tree of z-fields alone is opaque, and nothing is handed over there.
+        let relative = 3000.0 / Ladder::ZFIELD.range(&settings, 1000.0, 3000.0);
+        assert!((handover::tree_fade(relative, 0.0) - 1.0).abs() < 1e-6 && relative > 0.79);
+        assert!(handover::handed_over(relative) < 1e-12);
+        assert_eq!(Ladder::ZFIELD.resolved(&settings).to_string(), "zfield");
+    }
+
+    #[test]
+    fn there_is_one_band() {
+        assert_eq!(
+            [f64::from(FADE_FIRST) as f32, FADE_SPREAD, FADE_RATE, HANDOVER_FROM, HANDOVER_RATE],
+            [
+                handover::FADE_FIRST,
+                handover::FADE_SPREAD,
+                handover::FADE_RATE,
+                handover::HANDOVER_FROM,
+                handover::HANDOVER_RATE
+            ]
+            .map(|v| v as f32)
+        );
+        // It begins where the first tree does, and ends where the last has.
+        assert!((fade_begin() - handover::HANDOVER_FROM).abs() < 1e-6);
+        let end = handover::HANDOVER_FROM + 1.0 / handover::HANDOVER_RATE;
+        assert!((end - handover::fade_end(1.0)).abs() < 1e-12);
+    }
+}

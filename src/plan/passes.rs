@@ -1,0 +1,82 @@
+//! Passes and pipelines that a plan lists.
+
+use super::Plan;
+use super::items::Items;
+use super::names::{pass, pipeline};
+use super::tiles::{self, Rasterizer};
+use crate::scene::{Scene, Sky};
+
+/// Pipelines of the graphics rasteriser's tree pass, and for which trees.
+const TREE_PIPELINES: [(&str, &str); 4] = [
+    (pipeline::MAGNIFIED, "near trees: texels larger than pixels, filtered estimates"),
+    (pipeline::TREES, "trees of many pixels: unfiltered estimates"),
+    (pipeline::SMALL, "trees of few pixels: no estimates"),
+    (pipeline::CONVERGED, "trees whose light is the average"),
+];
+
+impl Plan {
+    /// Pipelines that depend on more than the scene's having trees.
+    pub(super) fn list_pipelines(&self, scene: &Scene, items: &mut Items) {
+        let mut add = |name: &str, reason: &str| items.step("pipeline", name, reason);
+        let tiles = self.rasterizer == Rasterizer::Tiles;
+        if tiles {
+            add(pipeline::GROUND, "light on the ground, once a pixel that sees it");
+        }
+        if self.z_fields {
+            let pipelines = if tiles { &tiles::TREE_PIPELINES[..] } else { &TREE_PIPELINES };
+            pipelines.iter().for_each(|(name, reason)| add(name, reason));
+            if self.sun {
+                let iterations = scene.settings.light_iterations;
+                let reason = format!("the sun is up: {iterations} iterations to where its light enters");
+                add(pipeline::LIGHT_RAY, &reason);
+            }
+        }
+    }
+
+    /// Passes, in the order of drawing.
+    pub(super) fn list_passes(&self, scene: &Scene, items: &mut Items) {
+        let mut add = |name: &str, reason: &str| items.step("pass", name, reason);
+        let trees = self.forest;
+        if scene.terrain.heights.is_some() {
+            add(pass::TERRAIN_TILES, "new quads of terrain");
+        }
+        if self.z_fields {
+            add(pass::SEEDS, "new quads of trees");
+        }
+        if trees {
+            add(pass::COVERAGE, "new quads of terrain with trees");
+        }
+        if self.z_fields {
+            for name in [pass::CULL, pass::SUMS, pass::COMMANDS, pass::COMPACT] {
+                add(name, "which trees are seen, in order");
+            }
+        }
+        if self.z_fields && self.cascades > 0 {
+            add(pass::CASTERS, "which trees cast shadows");
+        }
+        if self.cascades > 0 {
+            add(pass::SHADOWS, "the sun is up");
+        }
+        if matches!(scene.sky, Sky::LatLong { .. }) {
+            add(pass::SKY, "the sky is an image");
+        }
+        if trees {
+            add(pass::SHADER_MAP, "trees beyond range, and average light");
+        }
+        add(pass::TERRAIN, "the ground");
+        let tiles = self.rasterizer == Rasterizer::Tiles;
+        if self.z_fields && tiles {
+            tiles::TREE_PASSES.iter().for_each(|(name, reason)| add(name, reason));
+        }
+        if tiles {
+            add(pass::GROUND, "light on the ground, once a pixel that sees it");
+        }
+        if self.z_fields && tiles {
+            add(pass::TREE_LIGHT, "light on trees, once a pixel and tree that it sees");
+        }
+        if self.z_fields && !tiles {
+            add(pass::TREES, "trees within range");
+        }
+        add(pass::TONE_MAP, "the picture for display");
+    }
+}

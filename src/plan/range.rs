@@ -1,0 +1,141 @@
+//! How far trees are drawn one by one, and whether any tree can come so near.
+
+use super::Plan;
+use crate::camera::Eye;
+use crate::scene::{Distribution, Scene};
+
+impl Plan {
+    /// The range of every species and of all, the size of trees, and where they are drawn in another way.
+    pub(super) fn ranges(&mut self, scene: &Scene, eye: &Eye, places: &[[f64; 3]]) {
+        let s = &scene.settings;
+        self.forest = tree_density(scene) > 0.0;
+        for species in &scene.species {
+            let mut scale = f64::from(species.scale[1]);
+            if let Distribution::Positions(list) = &species.distribution {
+                let largest = list.iter().filter_map(|p| p.scale).fold(0.0, f32::max);
+                scale = scale.max(f64::from(largest));
+            }
+            let reach = species.mesh.positions.iter().map(|p| p[0].hypot(p[1]).max(p[2])).fold(0.0, f32::max);
+            self.tallest = self.tallest.max(f64::from(reach) * scale);
+        }
+        let farthest = self.farthest(scene, std::iter::once(&eye.position).chain(places));
+        for species in &scene.species {
+            let height = species.mesh.positions.iter().map(|p| p[2]).fold(0.0, f32::max).max(1e-3);
+            let range = self.ladder.range(s, f64::from(height) * eye.pixels_at_1m, farthest);
+            self.species_range.push(range);
+            self.range = self.range.max(range);
+        }
+        if self.ladder.averages() {
+            self.convergence = f64::from(s.convergence);
+        }
+        // The box of a tree is no wider than twice its reach. Filtered search is worth its price up to sqrt 2 texels a
+        // pixel; and views 10 degrees apart differ by less than a pixel under about eleven pixels: sin 10 degrees of
+        // half the size. Light that never converges does not within the range either.
+        let widest = 2.0 * self.tallest * eye.pixels_at_1m;
+        let near = widest * std::f64::consts::SQRT_2 / f64::from(s.view_resolution);
+        let converged = if self.convergence > 0.0 { self.convergence * self.range } else { self.range };
+        self.draw_limits = [near, widest / 11.0, converged.max(widest / 11.0)];
+        if !self.forest {
+            self.range = 0.0;
+            return;
+        }
+        // Level ground has no silhouettes. A shader-map at any distance, and trees at any distance, leave them as they are.
+        if scene.terrain.heights.is_some() && self.ladder.hands_over() {
+            let ratio = self.ladder.least_pixels(s) / f64::from(s.silhouette_min_pixels);
+            self.silhouette_ratio = ratio.max(1.0);
+        }
+    }
+
+    /// How far shadows are drawn, if any are needed.
+    pub(super) fn shadows(&mut self, scene: &Scene, eye: &Eye) {
+        let s = &scene.settings;
+        let diagonal = scene.terrain.extent[0].hypot(scene.terrain.extent[1]);
+        let seen = diagonal + eye.position[2].abs();
+        self.shadow_distance = match f64::from(s.shadow_distance) {
+            // The average light includes its shadows, at any distance or farther out.
+            0.0 if self.forest && !self.ladder.draws_trees() => {
+                self.cascades = 0;
+                0.0
+            }
+            0.0 if self.forest && self.convergence > 0.0 => (self.convergence * self.range).min(seen),
+            0.0 if self.forest => seen,
+            0.0 => diagonal,
+            chosen => chosen,
+        };
+    }
+
+    /// The farthest that a tree of the terrain may be from any of these places, m, or from any on the terrain.
+    fn farthest<'a>(&self, scene: &Scene, places: impl Iterator<Item = &'a [f64; 3]>) -> f64 {
+        let trees = self.trees_box(scene.terrain.extent, ground_range(scene));
+        places.copied().chain(trees).map(|place| farthest_in(trees, place)).fold(0.0, f64::max)
+    }
+
+    /// The box of all trees on ground of this extent between two heights.
+    fn trees_box(&self, extent: [f64; 2], [lowest, highest]: [f64; 2]) -> [[f64; 3]; 2] {
+        [[0.0, 0.0, lowest], [extent[0], extent[1], highest + self.tallest]]
+    }
+
+    /// Distance to which any tree is drawn, m: those on silhouettes go on beyond the range.
+    pub fn last_range(&self) -> f64 {
+        self.range * self.silhouette_ratio
+    }
+
+    /// Whether any tree on ground of this extent between two heights may be near enough to a place to be drawn by itself:
+    /// whether the box of their centres reaches into the range, with room for the rounding of single precision.
+    pub fn trees_in_range(&self, extent: [f64; 2], ground: [f64; 2], place: [f64; 3]) -> bool {
+        let [low, high] = self.trees_box(extent, ground);
+        let apart: f64 = (0..3).map(|k| (place[k] - place[k].clamp(low[k], high[k])).powi(2)).sum();
+        self.range > 0.0 && apart.sqrt() <= 1.001 * self.last_range() + 1.0
+    }
+
+    /// Whether trees of a ladder that hands over to no average are all drawn, on ground of this extent between two heights, as seen
+    /// from a place: whether none of them has begun to fade.
+    pub fn trees_within(&self, extent: [f64; 2], ground: [f64; 2], place: [f64; 3]) -> bool {
+        let farthest = farthest_in(self.trees_box(extent, ground), place);
+        !self.forest || self.ladder.averages() || farthest <= self.ladder.opaque_to(self.range)
+    }
+
+    /// Whether any tree of a scene may be near enough to a place to be drawn by itself. The nearest ground, below most cameras, saves
+    /// looking at all of it.
+    pub(super) fn scene_in_range(&self, scene: &Scene, place: [f64; 3]) -> bool {
+        let terrain = &scene.terrain;
+        let [x, y] = [0, 1].map(|k| place[k].clamp(0.0, terrain.extent[k]));
+        self.trees_in_range(terrain.extent, [terrain.height_at(x, y); 2], place)
+            || terrain.heights.is_some() && self.trees_in_range(terrain.extent, ground_range(scene), place)
+    }
+}
+
+/// The farthest that a point of a box is from a place, m.
+fn farthest_in([low, high]: [[f64; 3]; 2], place: [f64; 3]) -> f64 {
+    let axes = [0, 1, 2].map(|k| (place[k] - low[k]).abs().max((place[k] - high[k]).abs()));
+    axes[0].hypot(axes[1]).hypot(axes[2])
+}
+
+/// Trees per m² of all species together, at most.
+pub(super) fn tree_density(scene: &Scene) -> f64 {
+    let of = |d: &Distribution| match d {
+        Distribution::Density { max_density, .. } => f64::from(*max_density),
+        Distribution::Positions(list) => {
+            list.len() as f64 / (scene.terrain.extent[0] * scene.terrain.extent[1])
+        }
+    };
+    scene.species.iter().map(|s| of(&s.distribution)).sum()
+}
+
+/// The farthest that trees are from an eye, m: as far as the terrain is, seen from here or from anywhere on it.
+pub(super) fn farthest_trees(scene: &Scene, eye: &Eye) -> f64 {
+    let extent = scene.terrain.extent;
+    let farthest = [0, 1].map(|k| eye.position[k].abs().max((eye.position[k] - extent[k]).abs()));
+    let farthest = farthest[0].hypot(farthest[1]).hypot(eye.position[2]);
+    farthest.max(extent[0].hypot(extent[1]))
+}
+
+/// The lowest and the highest ground of a scene, with what bicubic interpolation may add.
+fn ground_range(scene: &Scene) -> [f64; 2] {
+    let Some(heights) = &scene.terrain.heights else { return [0.0; 2] };
+    let fold = |start: f32, f: fn(f32, f32) -> f32| f64::from(heights.samples.iter().copied().fold(start, f));
+    let [low, high] = [fold(f32::INFINITY, f32::min), fold(f32::NEG_INFINITY, f32::max)];
+    // Catmull-Rom weights: at most 9/8 in each direction.
+    let room = 0.3 * (high - low);
+    [low - room, high + room]
+}
