@@ -6,10 +6,10 @@
 
 use std::collections::BTreeMap;
 
+use super::pages::{Block, PageSet};
 use super::seeds::{FreshSeeds, SeedData};
 use super::species::SpeciesData;
 use crate::camera::cascades::Cascade;
-use crate::frame::pages::{Block, PageSet};
 use crate::gpu::interface::{
     CULL_GROUP, CasterParameters, CasterQuad, DrawCommand, Seed, SeedQuad, ShadowBlock, Species,
 };

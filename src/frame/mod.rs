@@ -2,7 +2,6 @@
 
 pub mod canvas;
 pub mod ground;
-pub mod pages;
 pub mod receivers;
 pub mod report;
 pub mod seen_ground;

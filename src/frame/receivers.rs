@@ -1,8 +1,8 @@
 //! Where a view looks into its shadow cascades: the pages that what it sees may be in.
 
-use super::pages::PageSet;
 use crate::camera::Eye;
 use crate::camera::cascades::Cascade;
+use crate::forest::pages::PageSet;
 use crate::land::quadtree::{Bounds, Quadtree};
 
 /// A rectangle of ground is cut until it is at most so many pages long.

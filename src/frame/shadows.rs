@@ -1,13 +1,13 @@
 //! All cascades in one layered pass: the terrain, then the trees' backs (BN12, section 5). What was drawn is kept: a frame draws
 //! the pages that it needs and the frames before did not.
 
-use super::pages::{Block, Held, blocks};
 use super::receivers;
 use super::shadow_ground::squares;
 use crate::Result;
 use crate::camera::Eye;
 use crate::camera::cascades::{Cascade, cascades};
 use crate::forest::casters::{CasterData, DrawnBlock};
+use crate::forest::pages::{Block, Held, blocks};
 use crate::forest::seeds::SeedData;
 use crate::forest::species::SpeciesData;
 use crate::forest::terrain::TerrainData;

@@ -72,11 +72,11 @@ const FAULTS: &[Fault] = &[
         case: "tiles/grove",
     },
     Fault {
-        name: "a tile done one tree early",
+        name: "a tile done a bin of depth early",
         file: "shaders/frame/trees/tiles/see.glsl",
-        from: "sight_bin(records, next.tree)",
-        to: "sight_bin(records, next.tree + 1u)",
-        case: "tiles/grove",
+        from: "bin_depth(sight_bin(records, next.tree))",
+        to: "bin_depth(sight_bin(records, next.tree) + 1u)",
+        case: "determinism/early-exit",
     },
 ];
 

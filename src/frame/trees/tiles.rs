@@ -103,7 +103,14 @@ impl TreeTiles {
             )?,
             entries_count: gpu.compute(&shaders::FRAME_TREES_TILES_ENTRIES_COUNT_COMP, &[])?,
             entries_fill: gpu.compute(&shaders::FRAME_TREES_TILES_ENTRIES_FILL_COMP, &[])?,
-            see: gpu.compute(see, &[("SAMPLES", plan.samples), ("ESTIMATES", before)])?,
+            see: gpu.compute(
+                see,
+                &[
+                    ("SAMPLES", plan.samples),
+                    ("ESTIMATES", before),
+                    ("EARLY_EXIT", u32::from(plan.tile_exit)),
+                ],
+            )?,
             shade: gpu.compute(
                 if plan.layers {
                     &shaders::FRAME_TREES_TILES_SHADE_LAYERS_COMP

@@ -25,10 +25,22 @@ fn renderer(
     rasterizer: Rasterizer,
     layers: bool,
 ) -> Result<(Renderer, Camera, f64)> {
+    planned(gpu, options, case, rasterizer, layers, |plan| plan.view_mode = case.mode)
+}
+
+/// The same, with a plan that something of is changed in.
+fn planned(
+    gpu: &Gpu,
+    options: &Options,
+    case: &SceneCase,
+    rasterizer: Rasterizer,
+    layers: bool,
+    change: impl FnOnce(&mut Plan),
+) -> Result<(Renderer, Camera, f64)> {
     let (scene, camera) = case.load()?;
     let eye = Eye::new(&camera, &scene.terrain, SIZE);
     let mut plan = Plan::for_eye(&scene, &eye, layers, rasterizer, Some(gpu.info()))?;
-    plan.view_mode = case.mode;
+    change(&mut plan);
     let exposure = auto_exposure(&scene);
     let baked = bakes(&scene, &plan, options)?;
     Ok((Renderer::new(gpu, Arc::new(scene), plan, &baked)?, camera, exposure))
@@ -127,6 +139,33 @@ pub(super) fn again(gpu: &Gpu, options: &Options) -> Result<Finding> {
     let [a, b] = [digests(gpu, options, DETERMINISM)?, digests(gpu, options, DETERMINISM)?];
     let problem = (a != b).then(|| format!("two renderers draw other bits: {}, {}", short(&a), short(&b)));
     Ok(finding(problem.as_slice(), short(&a)))
+}
+
+/// Scenes in which many trees hide others, near and far.
+const HIDING: [&str; 2] = ["grove", "inside"];
+
+/// Tiles that end before what is hidden draw the bits of tiles that look at every tree.
+pub(super) fn early_exit(gpu: &Gpu, options: &Options) -> Result<Finding> {
+    let (mut problems, mut compared) = (Vec::new(), 0);
+    for scene in HIDING {
+        let case = scenes::find(scene)?;
+        let picture = |exit: bool| -> Result<Picture> {
+            let change = |plan: &mut Plan| plan.tile_exit = exit;
+            let (mut renderer, camera, exposure) =
+                planned(gpu, options, case, Rasterizer::Tiles, true, change)?;
+            renderer.render(&camera, exposure)?;
+            renderer.picture()
+        };
+        let (with, without) = (picture(true)?, picture(false)?);
+        compared += with.display.len() / 4;
+        if with != without {
+            let differ =
+                with.display.chunks(4).zip(without.display.chunks(4)).filter(|(a, b)| a != b).count();
+            problems
+                .push(format!("{scene}: {differ} pixels shown are others where tiles look at every tree"));
+        }
+    }
+    Ok(finding(&problems, format!("{compared} pixels the same where tiles look at every tree")))
 }
 
 /// The bits of a scene's frame by each rasteriser, as hashes.

@@ -29,6 +29,7 @@ layout(binding = 7) uniform sampler2DArray views;
 layout(push_constant) uniform Push { TileParameters p; };
 layout(constant_id = 0) const uint SAMPLES = 4u;
 layout(constant_id = 1) const uint ESTIMATES = 1u;
+layout(constant_id = 2) const bool EARLY_EXIT = true; // without, hidden trees are looked at too, to the same bits
 
 // A box is columns times rows: a pixel is in those of its column's trees that are its row's too.
 shared uint pairs[PART / 2u];   // columns | rows << 8 of one tree, and of the next << 16
@@ -126,7 +127,7 @@ uint find_next(inout Next next, float farthest, bool whole, uint begin, uint wor
     uint k = (next.word - 1u) * 32u + uint(findLSB(max(next.trees, 1u)));
     next.tree = tree_at(whole, begin + (next.done ? 0u : k), end);
     next.trees &= next.trees - 1u;
-    next.hidden = !next.done && farthest * bin_depth(sight_bin(records, next.tree)) > p.near;
+    next.hidden = EARLY_EXIT && !next.done && farthest * bin_depth(sight_bin(records, next.tree)) > p.near;
     next.done = next.done || next.hidden;
     return next.word - first;
 }
