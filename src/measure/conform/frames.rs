@@ -142,7 +142,7 @@ pub(super) fn again(gpu: &Gpu, options: &Options) -> Result<Finding> {
 }
 
 /// Scenes in which many trees hide others, near and far.
-const HIDING: [&str; 2] = ["grove", "inside"];
+const HIDING: [&str; 2] = ["grove", "hills"];
 
 /// Tiles that end before what is hidden draw the bits of tiles that look at every tree.
 pub(super) fn early_exit(gpu: &Gpu, options: &Options) -> Result<Finding> {
