@@ -4,16 +4,16 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Parts of the library from the top down: each uses only what stands below it. Silhouettes of the land are what an eye sees of it, and
-/// cascades are boxes around land: so eyes and land use each other's plain data, and share a line.
-const STOREYS: [&[&str]; 14] = [
+/// Parts of the library from the top down: each uses only what stands below it. A scene says which ladder it wants, so that is below it.
+const STOREYS: [&[&str]; 15] = [
     &["measure"],
     &["reference"],
     &["frame"],
     &["forest"],
     &["bake"],
     &["plan"],
-    &["land", "camera"],
+    &["land"],
+    &["camera"],
     &["scene"],
     &["tree"],
     &["ladder"],

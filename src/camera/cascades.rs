@@ -2,9 +2,8 @@
 //! those of one endless map of the world as the sun sees it: where the eye is decides which of them it holds, and nothing else.
 //! So what is drawn of the map stays right while the eye moves and turns, and shadows do not swim.
 
-use super::{Eye, add, cross, dot, normalize};
+use super::{Bounds, Eye, add, cross, dot, normalize};
 use crate::gpu::interface::{SHADOW_DEPTHS, SHADOW_PAGES};
-use crate::land::quadtree::Bounds;
 use crate::physics::shadow::parallel_splits;
 
 /// Texels around what is seen that lookups may filter over.

@@ -3,9 +3,9 @@
 //! A cascade holds a square of an endless map ([`ShadowGrid`]) in an image that repeats: every page of the map has one place in
 //! the image, whatever square is held. So a page that was drawn stays where it is while the square moves on around it.
 
+use crate::camera::Bounds;
 use crate::camera::cascades::{Cascade, MARGIN, ShadowGrid};
 use crate::gpu::interface::SHADOW_PAGES;
-use crate::land::quadtree::Bounds;
 
 const SIDE: usize = SHADOW_PAGES as usize;
 

@@ -3,12 +3,12 @@
 use super::cache::SlotCache;
 use super::species::SpeciesData;
 use super::terrain::TerrainData;
-use crate::camera::Eye;
+use crate::camera::{Bounds, Eye};
 use crate::gpu::interface::{DrawCommand, SeedParameters, SeedQuad};
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
 use crate::land::density::density_map_size;
 use crate::land::listed::{ListedRanges, bin_listed};
-use crate::land::quadtree::{Bounds, Quadtree};
+use crate::land::quadtree::Quadtree;
 use crate::land::silhouette::{Belt, Ground, silhouette_quads};
 use crate::plan::names::{pass, resource};
 use crate::plan::{Plan, QUAD_INDEX_BYTES};

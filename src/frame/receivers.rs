@@ -1,9 +1,9 @@
 //! Where a view looks into its shadow cascades: the pages that what it sees may be in.
 
-use crate::camera::Eye;
 use crate::camera::cascades::Cascade;
+use crate::camera::{Bounds, Eye};
 use crate::forest::pages::PageSet;
-use crate::land::quadtree::{Bounds, Quadtree};
+use crate::land::quadtree::Quadtree;
 
 /// A rectangle of ground is cut until it is at most so many pages long.
 const PAGES: f64 = 4.0;

@@ -5,6 +5,7 @@
 //! distance is below refine s plus the quad's diagonal, 1.9 s on slopes up to 40°), and from there on a coarser one may
 //! (its box is at least 2 refine s away). So shared vertices are equal in both, and levels change only where both agree.
 
+use crate::camera::Bounds;
 use crate::physics::raster::Raster;
 use crate::scene::Terrain;
 
@@ -27,37 +28,6 @@ impl QuadKey {
     pub fn ancestor(self, level: u32) -> QuadKey {
         let up = self.level.saturating_sub(level);
         QuadKey { level: self.level - up, x: self.x >> up, y: self.y >> up }
-    }
-}
-
-/// An axis-aligned box in world coordinates, m.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// Smallest corner.
-    pub low: [f64; 3],
-    /// Largest corner.
-    pub high: [f64; 3],
-}
-
-impl Bounds {
-    /// Distance from a point; 0 inside.
-    pub fn distance(&self, p: [f64; 3]) -> f64 {
-        let d = [0, 1, 2].map(|k| (self.low[k] - p[k]).max(p[k] - self.high[k]).max(0.0));
-        (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
-    }
-
-    /// Distance of its farthest corner from a point.
-    pub fn farthest(&self, p: [f64; 3]) -> f64 {
-        let d = [0, 1, 2].map(|k| (self.high[k] - p[k]).abs().max((self.low[k] - p[k]).abs()));
-        (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
-    }
-
-    /// Whether any of it is on the inner side of every plane (n, d), n·p + d ≥ 0 inside, for points from `eye`.
-    pub fn touches(&self, planes: &[[f64; 4]], eye: [f64; 3]) -> bool {
-        planes.iter().all(|n| {
-            let farthest = [0, 1, 2].map(|k| if n[k] > 0.0 { self.high[k] } else { self.low[k] } - eye[k]);
-            n[0] * farthest[0] + n[1] * farthest[1] + n[2] * farthest[2] + n[3] >= 0.0
-        })
     }
 }
 

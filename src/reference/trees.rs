@@ -7,9 +7,9 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::foliage::Foliage;
-use crate::camera::Eye;
+use crate::camera::{Bounds, Eye};
 use crate::land::candidate::{Candidate, Layout, listed};
-use crate::land::quadtree::{Bounds, Quadtree};
+use crate::land::quadtree::Quadtree;
 use crate::physics::light::sun_disc_fraction;
 use crate::scene::{Distribution, Scene};
 use crate::{Error, Result};

@@ -83,6 +83,20 @@ fn stamps_cost_at_most_two_per_cent() {
     gpu.close().unwrap();
 }
 
+/// A path of two minutes at most, each frame alone.
+fn request(path: CameraPath) -> Request {
+    Request {
+        path,
+        step: 0.5,
+        frames: 128,
+        duration: 120.0,
+        timing: TimingOptions::default(),
+        pace: false,
+        in_flight: 0,
+        validate: false,
+    }
+}
+
 /// What is missing are the stamps and barriers between passes; the median frame, because others may take the core between two.
 #[test]
 #[ignore = "takes minutes"]
@@ -90,16 +104,7 @@ fn passes_are_all_of_the_frame_within_three_per_cent() {
     let gpu = open();
     let (subject, path) = subject(&gpu);
     let timing = TimingOptions { stamps: Stamps::Scopes, apart: false, statistics: false };
-    let request = Request {
-        path,
-        step: 0.5,
-        frames: 128,
-        duration: 120.0,
-        timing,
-        pace: false,
-        in_flight: 0,
-        validate: false,
-    };
+    let request = Request { timing, ..request(path) };
     let mut subjects = [subject];
     let result = run(&gpu, &mut subjects, &request, true).unwrap().swap_remove(0);
     let parts: Vec<f64> = result
@@ -126,16 +131,7 @@ fn a_build_is_itself_and_five_per_cent_are_found() {
     let gpu = open();
     let (subject, path) = subject(&gpu);
     let timing = TimingOptions { stamps: Stamps::Scopes, apart: true, statistics: false };
-    let request = Request {
-        path,
-        step: 0.5,
-        frames: 256,
-        duration: 120.0,
-        timing,
-        pace: true,
-        in_flight: 0,
-        validate: false,
-    };
+    let request = Request { frames: 256, timing, pace: true, ..request(path) };
     let mut subjects = [subject];
     let runs: Vec<BenchResult> =
         (0..21).map(|_| run(&gpu, &mut subjects, &request, true).unwrap().swap_remove(0)).collect();
