@@ -5,6 +5,7 @@ use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Resource, Sampler, vk};
 use crate::land::density::{DensityMap, HEIGHT_SOFTNESS, SLOPE_SOFTNESS, density_map};
 use crate::physics::masks::combination_table;
+use crate::physics::outline;
 use crate::physics::raster::Raster;
 use crate::physics::transfer::NEUTRAL;
 use crate::physics::views;
@@ -24,6 +25,8 @@ pub struct SpeciesData {
     pub table: Buffer,
     /// z-field views, species after species.
     pub views: Image,
+    /// Outlines of the same views, if tiles look for trees; else nothing.
+    pub outlines: Buffer,
     /// Light transfer of the same views by band; of bands that are not used one texel.
     pub transfer: [Image; 2],
     /// Bases of the views, species after species.
@@ -86,6 +89,7 @@ impl SpeciesData {
             rows,
             count: scene.species.len() as u32,
             views: texels,
+            outlines: outlines(gpu, plan, baked)?,
             transfer,
             bases: {
                 let bytes = size_of_val(bases.as_slice()) as u64;
@@ -130,6 +134,16 @@ fn block(rows: &[Row]) -> Vec<Row> {
     let mut block = rows.to_vec();
     block.resize(MAX_SPECIES as usize, bytemuck::Zeroable::zeroed());
     block
+}
+
+/// Uploads outlines of the views of all species.
+fn outlines(gpu: &Gpu, plan: &Plan, baked: &[Baked]) -> Result<Buffer> {
+    let described = plan.buffer(resource::OUTLINES);
+    let words = match described.bytes {
+        0 => Vec::new(),
+        _ => baked.iter().flat_map(|b| outline::outlines(&b.species.views)).collect(),
+    };
+    gpu.described_buffer_with(&described, &words)
 }
 
 /// Uploads a band of the light transfer of all species.

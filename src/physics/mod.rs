@@ -5,6 +5,7 @@ pub mod handover;
 pub mod hash;
 pub mod light;
 pub mod masks;
+pub mod outline;
 pub mod raster;
 pub mod shadow;
 pub mod tables;

@@ -3,9 +3,11 @@
 use super::Plan;
 use super::items::Items;
 use super::names::resource;
+use super::tiles::Rasterizer;
 use crate::gpu::interface as gpu;
 use crate::gpu::{BufferDesc, Description, ImageDesc, VolumeDesc, vk};
 use crate::land::density::density_map_size;
+use crate::physics::outline::ROWS as OUTLINE_ROWS;
 use crate::physics::views;
 use crate::scene::{Albedo, Scene, Sky};
 
@@ -24,6 +26,12 @@ pub fn tables(species: u32, angles: u32, densities: u32) -> (VolumeDesc, ImageDe
     let pairs = VolumeDesc { name: resource::PAIR_TABLES, format: HALVES, size };
     let views = ImageDesc::plain(resource::VIEW_TABLES, HALVES, [angles + 1, densities]);
     (pairs, ImageDesc { layers: species, ..views })
+}
+
+/// Outlines of species' views: a word a row.
+fn outlines(rings: u32, resolution: u32, species: u32) -> BufferDesc {
+    let words = u64::from(views::count(rings) * species * (resolution.ilog2() + 1)) * OUTLINE_ROWS as u64;
+    BufferDesc { texels: Some((vk::Format::R32_UINT, 4)), ..BufferDesc::new(resource::OUTLINES, 4 * words) }
 }
 
 impl Plan {
@@ -67,11 +75,16 @@ impl Plan {
             })
         };
         let views = array(resource::VIEWS, s.view_resolution);
+        let outlines = Description::Buffer(outlines(s.view_rings, s.view_resolution, count));
         let band = array(resource::TRANSFER, s.view_resolution / 2);
         for species in &scene.species {
             let name = &species.name;
             let reason = format!("species \"{name}\" is drawn tree by tree");
             items.shared("data", &format!("z-field views of {name}"), reason, vec![views], count);
+            if self.rasterizer == Rasterizer::Tiles {
+                let reason = format!("tiles look for species \"{name}\" only where it may be seen");
+                items.shared("data", &format!("view outlines of {name}"), reason, vec![outlines], count);
+            }
             if self.transfer_bands > 0 {
                 let bands = vec![band; self.transfer_bands as usize];
                 let reason = format!("sunlight on leaves of species \"{name}\", tree by tree");

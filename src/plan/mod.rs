@@ -72,10 +72,10 @@ pub struct Plan {
     /// Steps of writing the tiles' lists, at most: [`TILE_STEPS`]; tests set fewer before the renderer is made.
     #[serde(skip)]
     pub tile_steps: u32,
-    /// Whether a pixel of a tile is done when all that it sees is nearer than its next tree can be: that saves time and changes no
-    /// bit, which conformance proves by a renderer without.
+    /// Whether a pixel of a tile passes over trees on whose views' outlines it is not, and is done when all that it sees is nearer
+    /// than its next tree can be: that saves time and changes no bit, which conformance proves by a renderer without.
     #[serde(skip)]
-    pub tile_exit: bool,
+    pub tile_shortcuts: bool,
     /// Image size, pixels.
     pub size: [u32; 2],
     /// Samples a pixel.
@@ -228,7 +228,7 @@ impl Plan {
             view_mode: ViewMode::Radiance,
             rasterizer: Rasterizer::Graphics,
             tile_steps: TILE_STEPS,
-            tile_exit: true,
+            tile_shortcuts: true,
             size: eye.size,
             samples: check::samples(s.samples, device),
             layers,

@@ -88,6 +88,8 @@ pub mod resource {
     pub const SLOPE_TILES: &str = "slope tiles";
     /// z-field views of all species.
     pub const VIEWS: &str = "z-field views";
+    /// Outlines of the views of all species.
+    pub const OUTLINES: &str = "view outlines";
     /// A band of light transfer of all species.
     pub const TRANSFER: &str = "light transfer";
     /// Pair tables of all species.

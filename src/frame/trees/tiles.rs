@@ -15,6 +15,7 @@ use crate::frame::Forest;
 use crate::frame::targets::ImageTargets;
 use crate::gpu::interface::{BIN_LANES, DEPTH_BINS, ORDER_LANES, TILE_SIDE, TileParameters, TileState};
 use crate::gpu::{Buffer, Gpu, Image, Later, Program, Recorder, Resource, Sampler, Shader, shaders};
+use crate::physics::outline;
 use crate::plan::names::pass;
 use crate::plan::{Plan, TileBuffer, TileBuffers};
 use crate::scene::Scene;
@@ -108,7 +109,9 @@ impl TreeTiles {
                 &[
                     ("SAMPLES", plan.samples),
                     ("ESTIMATES", before),
-                    ("EARLY_EXIT", u32::from(plan.tile_exit)),
+                    ("SHORTCUTS", u32::from(plan.tile_shortcuts)),
+                    ("OUTLINE_ROWS", outline::ROWS as u32),
+                    ("VIEW_LEVELS", s.view_resolution.ilog2() + 1),
                 ],
             )?,
             shade: gpu.compute(
@@ -155,6 +158,7 @@ impl TreeTiles {
             ("state", Resource::Buffer(&self.state)),
             ("depths", Resource::Buffer(&self.depths)),
             ("views", Resource::Texture(&forest.species.views, Sampler::LinearBorder)),
+            ("outlines", Resource::Texels(&forest.species.outlines)),
         ];
         recorder.compute(pass::TREE_ORDER, |pass| {
             let depth = with(

@@ -62,7 +62,7 @@ enum Kind {
     Threads(&'static str),
     Again,
     Return,
-    EarlyExit,
+    Shortcuts,
     Validation(usize),
 }
 
@@ -142,7 +142,7 @@ pub fn cases() -> Vec<Case> {
     all.extend(probe::ALL.iter().enumerate().map(|(k, p)| case("probe", p.0, Kind::Probe(k))));
     all.push(case("determinism", "again", Kind::Again));
     all.push(case("determinism", "return", Kind::Return));
-    all.push(case("determinism", "early-exit", Kind::EarlyExit));
+    all.push(case("determinism", "shortcuts", Kind::Shortcuts));
     all.extend(["0", "1", "2"].map(|n| case("determinism", &format!("threads-{n}"), Kind::Threads(n))));
     all.extend(validation::ALL.iter().enumerate().map(|(k, v)| case("validation", v.0, Kind::Validation(k))));
     all
@@ -228,7 +228,7 @@ impl Suite {
             Kind::Frame(k) => with_device(o, |gpu| frames::check(gpu, o, &scenes::ALL[k])),
             Kind::Probe(k) => with_device(o, |gpu| probe::ALL[k].1(gpu)),
             Kind::Again => with_device(o, |gpu| frames::again(gpu, o)),
-            Kind::EarlyExit => with_device(o, |gpu| frames::early_exit(gpu, o)),
+            Kind::Shortcuts => with_device(o, |gpu| frames::shortcuts(gpu, o)),
             Kind::Return => with_device(o, |gpu| frames::return_flight(gpu, o)),
             Kind::Threads(n) => with_device(o, |gpu| frames::threads(gpu, o, n)),
             Kind::Validation(k) => validation::check(o, &validation::ALL[k]),

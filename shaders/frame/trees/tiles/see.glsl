@@ -1,6 +1,6 @@
 // The tree that each sample of a tile sees. One workgroup a tile of 8 x 8 pixels; one invocation a column of them.
 //
-// First the tile's list becomes bits: for each pixel, which of 32 trees' boxes it is in. Then every invocation goes through its
+// First the tile's list becomes bits: for each pixel, of which of 32 trees it may see something. Then every invocation goes through its
 // pixels, and each pixel through its own trees, front to back, until the farthest thing that one of its samples sees is nearer than
 // the next tree can be. Long lists are gone through in parts; between parts the samples are in the buffer that holds the result.
 #include "physics/masks.glsl"
@@ -9,10 +9,11 @@
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/tiles/order.glsl"
 #include "frame/trees/tiles/sight.glsl"
+#include "frame/trees/tiles/outline.glsl"
 #include "frame/samples.glsl"
 #include "frame/tile.glsl"
 
-const uint PART = 1024u;       // trees of a part of a list
+const uint PART = 512u;        // trees of a part of a list
 const uint WORDS = PART / 32u; // of bits a pixel
 // Drivers end loops in silence after 65,535 turns of all loops of an invocation together (llvmpipe): before, a tile gives up aloud.
 const uint MOST_TURNS = 60000u;
@@ -26,23 +27,20 @@ layout(std430, binding = 4) buffer State { TileState items[]; } state;
 layout(std430, binding = 5) buffer Seen { uint items[]; } seen;     // trees, counted from 1
 layout(std430, binding = 6) buffer Depths { float items[]; } depths; // of samples, in tiles whose list has several parts
 layout(binding = 7) uniform sampler2DArray views;
+layout(binding = 9) uniform usamplerBuffer outlines; // of views
 layout(push_constant) uniform Push { TileParameters p; };
 layout(constant_id = 0) const uint SAMPLES = 4u;
 layout(constant_id = 1) const uint ESTIMATES = 1u;
-layout(constant_id = 2) const bool EARLY_EXIT = true; // without, hidden trees are looked at too, to the same bits
 
-// A box is columns times rows: a pixel is in those of its column's trees that are its row's too.
-shared uint pairs[PART / 2u];   // columns | rows << 8 of one tree, and of the next << 16
-shared uint columns[WORDS * 8u]; // of each column, which of 32 trees' boxes it crosses
-shared uint rows[WORDS * 8u];
+shared uvec2 shown[PART];         // of each tree, the pixels that may see it: eight bits a row
+shared uint pixels[WORDS * 64u];  // of each pixel, which of 32 trees it may see
 shared uint left; // whether a pixel may see trees of the next part
 
-// Columns and rows of a tile that a tree's box covers: eight bits each.
-uint covered_lines(uint tree, uvec2 corner) {
+// Pixels of a tile that may see a tree.
+uvec2 pixels_of(uint tree, uvec2 corner) {
     uvec2 b = texelFetch(boxes, int(tree)).xy;
     ivec4 box = clamp(ivec4(b.x & 0xffffu, b.x >> 16u, b.y & 0xffffu, b.y >> 16u) - ivec4(corner, corner), ivec4(0), ivec4(8));
-    uvec4 low = (uvec4(1u) << uvec4(box)) - 1u;
-    return (low.z & ~low.x) | (low.w & ~low.y) << 8u;
+    return outlined_pixels(outlines, unpack_sight(records, tree), vec2(corner), box);
 }
 
 uint tree_at(bool whole, uint place, uint end) {
@@ -50,28 +48,25 @@ uint tree_at(bool whole, uint place, uint end) {
     return whole ? place : texelFetch(entries, int(place)).x;
 }
 
-// Notes which columns and rows the boxes of a part's trees cover: of four trees in a row, and across eight such words.
-void note_boxes(bool whole, uint begin, uint count, uint end, uvec2 corner, uint column) {
+// Notes which trees of a part each pixel of a column may see: of four trees in a row, and across eight such words.
+void note_pixels(bool whole, uint begin, uint count, uint end, uvec2 corner, uint column) {
     uint words = (count + 31u) / 32u;
     for (uint word = 0u; word < words; word++) {
-        for (uint k = 0u; k < 4u; k += 2u) {
-            uint first = word * 32u + column * 4u + k;
-            uint a = covered_lines(tree_at(whole, begin + first, end), corner);
-            uint b = covered_lines(tree_at(whole, begin + first + 1u, end), corner);
-            pairs[first >> 1u] = (first < count ? a : 0u) | (first + 1u < count ? b << 16u : 0u);
+        for (uint k = 0u; k < 4u; k++) {
+            uint place = word * 32u + column * 4u + k;
+            uvec2 some = pixels_of(tree_at(whole, begin + place, end), corner);
+            shown[place] = place < count ? some : uvec2(0u);
         }
     }
     barrier();
     left = 0u;
     for (uint word = 0u; word < words; word++) {
-        uint across = 0u, down = 0u;
-        for (uint k = 0u; k < 16u; k++) {
-            uint two = pairs[word * 16u + k] >> column;
-            across |= ((two & 1u) | (two >> 15u & 2u)) << (2u * k);
-            down |= ((two >> 8u & 1u) | (two >> 23u & 2u)) << (2u * k);
+        uint rows[8] = uint[](0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
+        for (uint k = 0u; k < 32u; k++) {
+            uvec2 some = shown[word * 32u + k] >> column;
+            for (uint row = 0u; row < 8u; row++) rows[row] |= ((row < 4u ? some.x : some.y) >> (8u * (row & 3u)) & 1u) << k;
         }
-        columns[word * 8u + column] = across;
-        rows[word * 8u + column] = down;
+        for (uint row = 0u; row < 8u; row++) pixels[word * 64u + row * 8u + column] = rows[row];
     }
     barrier();
 }
@@ -120,14 +115,14 @@ struct Next {
 uint find_next(inout Next next, float farthest, bool whole, uint begin, uint words, uint end, uint column, uint row) {
     uint first = next.word;
     while (next.trees == 0u && next.word < words && !next.done) {
-        next.trees = columns[next.word * 8u + column] & rows[next.word * 8u + row];
+        next.trees = pixels[next.word * 64u + row * 8u + column];
         next.word++;
     }
     next.done = next.done || next.trees == 0u;
     uint k = (next.word - 1u) * 32u + uint(findLSB(max(next.trees, 1u)));
     next.tree = tree_at(whole, begin + (next.done ? 0u : k), end);
     next.trees &= next.trees - 1u;
-    next.hidden = EARLY_EXIT && !next.done && farthest * bin_depth(sight_bin(records, next.tree)) > p.near;
+    next.hidden = SHORTCUTS && !next.done && farthest * bin_depth(sight_bin(records, next.tree)) > p.near;
     next.done = next.done || next.hidden;
     return next.word - first;
 }
@@ -146,8 +141,8 @@ void main() {
     bool more = true, parted = end > first + PART;
     for (uint begin = first; more; begin += PART) {
         uint count = min(end - min(begin, end), PART), words = (count + 31u) / 32u;
-        note_boxes(whole, begin, count, end, corner, column);
-        turns += 3u * words;
+        note_pixels(whole, begin, count, end, corner, column);
+        turns += (4u * (1u + TILE_SIDE) + 32u) * words;
         bool open = false;
         for (uint row = 0u; row < TILE_SIDE; row++) {
             uvec2 pixel = corner + uvec2(column, row);
