@@ -1,7 +1,7 @@
-//! Instance, device, queue, allocator, validation.
+//! Device, queue and allocator, and what keeps them alive.
 
 use std::collections::BTreeMap;
-use std::ffi::{CStr, CString, c_void};
+use std::ffi::{CStr, CString};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
@@ -9,46 +9,12 @@ use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::failures::{Failure, Failures};
+use super::instance::{Root, Validation};
 use super::memory::Retired;
 use super::program::Sampler;
 use super::select::{DeviceInfo, choose};
 use super::timing::{Calibration, TimingState, calibration_extension};
 use crate::{Error, Result};
-
-const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
-
-/// What the validation layers watch. Messages are kept for [`Gpu::messages`], and [`Gpu::close`] fails with them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Validation {
-    /// Nothing: the layers are not loaded.
-    #[default]
-    Off,
-    /// Core and synchronization validation.
-    Full,
-    /// Core validation alone.
-    Core,
-    /// Synchronization validation alone.
-    Synchronization,
-    /// Shaders too, by instrumenting them: slow.
-    GpuAssisted,
-}
-
-impl Validation {
-    /// What the layers do beside, and instead of, core validation.
-    fn features(
-        self,
-    ) -> (&'static [vk::ValidationFeatureEnableEXT], &'static [vk::ValidationFeatureDisableEXT]) {
-        use {vk::ValidationFeatureDisableEXT as Disable, vk::ValidationFeatureEnableEXT as Enable};
-        match self {
-            Validation::Off | Validation::Core => (&[], &[]),
-            Validation::Full => (&[Enable::SYNCHRONIZATION_VALIDATION], &[]),
-            Validation::Synchronization => (&[Enable::SYNCHRONIZATION_VALIDATION], &[Disable::CORE_CHECKS]),
-            Validation::GpuAssisted => {
-                (&[Enable::GPU_ASSISTED, Enable::GPU_ASSISTED_RESERVE_BINDING_SLOT], &[])
-            }
-        }
-    }
-}
 
 /// How to open a device.
 #[derive(Clone, Debug, Default)]
@@ -97,36 +63,6 @@ pub(super) struct Shared {
     root: Root,
 }
 
-/// The instance, and what listens to its validation layers.
-struct Root {
-    messages: Arc<Mutex<Vec<String>>>,
-    messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
-    instance: ash::Instance,
-    // Last: the loader must outlive everything made through it.
-    _entry: ash::Entry,
-}
-
-impl Drop for Root {
-    fn drop(&mut self) {
-        // SAFETY: `Shared`, the only other user, is gone or was never made: no device and no other child is alive.
-        unsafe {
-            if let Some((debug, messenger)) = self.messenger.take() {
-                debug.destroy_debug_utils_messenger(messenger, None);
-            }
-            self.instance.destroy_instance(None);
-        }
-    }
-}
-
-pub(super) fn load_entry() -> Result<ash::Entry> {
-    // SAFETY: the Vulkan loader is a well-behaved library; nothing else runs in its initialisers.
-    unsafe { ash::Entry::load() }.map_err(|e| {
-        Error::NoDevice(format!(
-            "no Vulkan loader ({e}); on Debian: apt-get install libvulkan1 mesa-vulkan-drivers"
-        ))
-    })
-}
-
 /// Maps a Vulkan failure to the error that carries the right exit code.
 pub(super) fn device_error(what: &str) -> impl FnOnce(vk::Result) -> Error + '_ {
     move |e| {
@@ -158,52 +94,12 @@ impl Gpu {
     /// its layer is not installed; [`Error::Device`] when memory runs out.
     pub fn new(options: &GpuOptions) -> Result<Self> {
         let failures = Failures::from_environment()?;
-        let entry = load_entry()?;
-        let app = vk::ApplicationInfo::default()
-            .application_name(c"canopy")
-            .engine_name(c"canopy")
-            .api_version(vk::API_VERSION_1_3);
-        // SAFETY: the loader is loaded.
-        let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
-        let validate = options.validation != Validation::Off;
-        if validate && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION)) {
-            return Err(Error::NoDevice(
-                "validation was asked for but VK_LAYER_KHRONOS_validation is not installed \
-                 (on Debian: apt-get install vulkan-validationlayers)"
-                    .into(),
-            ));
-        }
-        // SAFETY: the loader is loaded.
-        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
-        let debug_utils =
-            validate || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
-        let layer_names = [VALIDATION.as_ptr()];
-        let extension_names = [ext::debug_utils::NAME.as_ptr()];
-        let (enables, disables) = options.validation.features();
-        let mut features = vk::ValidationFeaturesEXT::default()
-            .enabled_validation_features(enables)
-            .disabled_validation_features(disables);
-        let mut create = vk::InstanceCreateInfo::default().application_info(&app);
-        if debug_utils {
-            create = create.enabled_extension_names(&extension_names);
-        }
-        if validate {
-            create = create.enabled_layer_names(&layer_names).push_next(&mut features);
-        }
-        // SAFETY: `create` and what it points to live through the call.
-        let instance = unsafe { entry.create_instance(&create, None) }
-            .map_err(|e| Error::NoDevice(format!("no Vulkan instance: {e}")))?;
-
-        let mut root =
-            Root { messages: Arc::default(), messenger: None, instance: instance.clone(), _entry: entry };
-        if validate {
-            root.messenger = Some(listen(&root._entry, &instance, &root.messages)?);
-        }
-        let (physical, mut info) = choose(&instance, options.device.as_deref())?;
+        let root = Root::new(options.validation)?;
+        let (physical, mut info) = choose(&root.instance, options.device.as_deref())?;
         info.vertex_layers &= !options.frugal;
         // GPU-assisted validation (1.3.239) takes pushed descriptors for uninitialised, and checks nothing behind them.
         info.push_descriptors &= !options.frugal && options.validation != Validation::GpuAssisted;
-        let shared = open(root, physical, info, debug_utils, failures)?;
+        let shared = open(root, physical, info, failures)?;
         Ok(Gpu { shared: Arc::new(shared) })
     }
 
@@ -292,48 +188,7 @@ impl Gpu {
     }
 }
 
-fn listen(
-    entry: &ash::Entry,
-    instance: &ash::Instance,
-    messages: &Arc<Mutex<Vec<String>>>,
-) -> Result<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)> {
-    let debug = ext::debug_utils::Instance::new(entry, instance);
-    let create = vk::DebugUtilsMessengerCreateInfoEXT::default()
-        .message_severity(
-            vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
-        )
-        // Not PERFORMANCE: it dislikes images in GENERAL layout, which is a choice here.
-        .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
-        .pfn_user_callback(Some(on_message))
-        .user_data(Arc::as_ptr(messages) as *mut c_void);
-    // SAFETY: `messages` is kept by `Root` until after the messenger is destroyed.
-    let messenger = unsafe { debug.create_debug_utils_messenger(&create, None) }
-        .map_err(device_error("debug messenger"))?;
-    Ok((debug, messenger))
-}
-
-/// Keeps a validation message.
-unsafe extern "system" fn on_message(
-    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
-    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
-    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
-    user: *mut c_void,
-) -> vk::Bool32 {
-    // SAFETY: the layer passes valid data; `user` is the message list that `Root` keeps alive.
-    unsafe {
-        let text = CStr::from_ptr((*data).p_message).to_string_lossy().into_owned();
-        lock(&*(user as *const Mutex<Vec<String>>)).push(text);
-    }
-    vk::FALSE
-}
-
-fn open(
-    root: Root,
-    physical: vk::PhysicalDevice,
-    info: DeviceInfo,
-    debug_utils: bool,
-    failures: Failures,
-) -> Result<Shared> {
+fn open(root: Root, physical: vk::PhysicalDevice, info: DeviceInfo, failures: Failures) -> Result<Shared> {
     let instance = root.instance.clone();
     // SAFETY: instance and physical device are alive throughout; every create struct outlives its call. On failure
     // `Shared` destroys what was made so far.
@@ -383,7 +238,7 @@ fn open(
             pipelines: Mutex::default(),
             heap_bytes: Mutex::new([0; vk::MAX_MEMORY_HEAPS]),
             push: push.map(|_| khr::push_descriptor::Device::new(&instance, &device)),
-            names: debug_utils.then(|| ext::debug_utils::Device::new(&instance, &device)),
+            names: root.debug_utils.then(|| ext::debug_utils::Device::new(&instance, &device)),
             queue: device.get_device_queue(family, 0),
             family,
             device: device.clone(),

@@ -13,6 +13,7 @@ mod capture;
 mod context;
 mod description;
 mod failures;
+mod instance;
 pub mod interface;
 mod memory;
 mod program;
@@ -25,10 +26,11 @@ mod transfer;
 
 pub use ash::vk;
 pub use capture::FrameCapture;
-pub use context::{Gpu, GpuOptions, Validation};
+pub use context::{Gpu, GpuOptions};
 pub use description::{BufferDesc, Description, VolumeDesc};
 #[doc(hidden)]
 pub use failures::Failure;
+pub use instance::Validation;
 pub use memory::{Buffer, Image, ImageDesc};
 pub use program::{DepthTest, GraphicsDesc, Program, Sampler};
 #[doc(hidden)]

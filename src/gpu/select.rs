@@ -4,7 +4,7 @@ use std::ffi::CStr;
 
 use ash::vk;
 
-use super::context::load_entry;
+use super::instance::load_entry;
 use super::{Shader, shaders};
 use crate::{Error, Result};
 

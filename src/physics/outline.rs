@@ -113,7 +113,7 @@ mod tests {
             for layer in 0..layers {
                 for blob in 0..3u32 {
                     let place = hash(layer as u32 * 3 + blob) as usize % (resolution * resolution);
-                    let (x, y) = (place % resolution >> level, place / resolution >> level);
+                    let (x, y) = ((place % resolution) >> level, (place / resolution) >> level);
                     texels[4 * (layer * side * side + y * side + x) + 3] = 9;
                 }
             }
