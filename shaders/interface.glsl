@@ -109,7 +109,7 @@ struct Seed {
     uint turn_tint;                   // low half: rotation in 1/65536 turn; high half: tint
     uint identity;                    // hash from which the tree's other random numbers come
     uint slope;                       // two halves: derivatives of the ground's height east and north
-    uint species_density;             // low half: index; high half: square root of the density of all trees, half float
+    uint species_density;             // low half: index; high half, half float: square root of the density at which trees of it would cover what all trees here do
 };
 
 // A seed quad with a region of seeds.

@@ -479,13 +479,13 @@ fn slopes_hide_what_single_trees_say() {
             [(of(0.5, 0.0), of(0.7, 2.0)), (of(1.1, 1.0), of(0.4, -1.0)), (of(0.6, 3.0), of(0.6, 3.0))]
         {
             let a = tables::angles(v, l, up, f64::from(t.vertical_scale));
-            let level = tables::forest(t, v, l, up, x);
+            let level = tables::forest(t, v, l, up, x, x);
             assert_eq!(level.seen, x * a.sec_v * tables::view(t, a.v, x)[0]);
             assert_eq!(level.sun[0], tables::pair(t, a.v, a.l, a.phi, x)[1]);
             for tilt in [-0.5f64, -0.2, 0.3, 0.5] {
                 let n = [tilt.sin(), 0.0, tilt.cos()];
                 let cosine = v[0] * n[0] + v[2] * n[2];
-                let f = tables::forest(t, v, l, n, x);
+                let f = tables::forest(t, v, l, n, x, x);
                 // A sphere's shadow along v is its disc over the cosine to the slope, and as much less on the map.
                 let path = x * n[2] / cosine;
                 assert!((f.seen - path).abs() < 0.03 * path, "{v:?} {tilt} {x}: {} {path}", f.seen);

@@ -51,8 +51,9 @@ uint lookup(vec3 w, out vec2 weights) {
 
 // The light of the average tree around this one, towards which its own converges with nu (BN12, eq. 22 and 23).
 void average_light(inout Tree t, Species kind, vec3 to_camera, vec3 ground, float density, float nu) {
-    TableForest f = table_forest(pair_table, view_table, to_camera, view.v.sun_direction, ground, kind.vertical_scale,
-                                 density * kind.mean_area, kind.max_thickness, float(t.species), TABLE_ANGLES,
+    float x = density * kind.mean_area;
+    TableForest f = table_forest(pair_table, view_table, to_camera, view.v.sun_direction, ground, kind.vertical_scale, x,
+                                 min(x, kind.max_thickness), kind.max_thickness, float(t.species), TABLE_ANGLES,
                                  TABLE_DENSITIES, PAIR_TABLES);
     float lit = nu * sun_facing(view.v.sun_direction, ground);
     t.own = 1.0 - nu;

@@ -61,10 +61,13 @@ bool candidate(SeedQuad q, uint index, uint pattern_count, out Seed s) {
     s.ground = g.x;
     s.identity = id;
     s.slope = packHalf2x16(g.yz);
+    // As dense as trees of this species would have to be to cover what all trees here do.
+    float thickness = 0.0;
     for (uint k = 0u; k < scene_size.species_count; k++) {
         Species other = species.items[k];
-        if (other.listed_density > 0.0) total += horizontal_density(other, world, p.extent, g.x, slope);
+        float here = other.listed_density > 0.0 ? horizontal_density(other, world, p.extent, g.x, slope) : densities_here[k];
+        thickness += other.mean_area * here;
     }
-    s.species_density = kind | packHalf2x16(vec2(0.0, sqrt(total)));
+    s.species_density = kind | packHalf2x16(vec2(0.0, sqrt(thickness / species.items[kind].mean_area)));
     return true;
 }

@@ -89,11 +89,12 @@ float mean_through(float x) { return x < 1e-2 ? 1.0 - x * (0.5 - x / 6.0) : (1.0
 // Along v of trees of optical thickness x (density times area) on a slope of unit normal n. The tables are of level ground,
 // which a shear makes of the slope. It leaves how trees stand to each other, and changes crowns: what one crown by itself is
 // to v and l, at density 0, is put in place of what the shear makes of it, and where that lets less light through, or more,
-// so do the crowns before it. Nothing changes on level ground.
-TableForest table_forest(sampler3D pairs, sampler2DArray views, vec3 v, vec3 l, vec3 n, float k, float x, float x_max,
-                         float species, float count, float m, bool lit) {
+// so do the crowns before it. Nothing changes on level ground. `known` is the thickness of the species' own forest that is looked up:
+// x where it stands alone, at most that where larger trees stand with it, which take more of the light than its own would.
+TableForest table_forest(sampler3D pairs, sampler2DArray views, vec3 v, vec3 l, vec3 n, float k, float x, float known,
+                         float x_max, float species, float count, float m, bool lit) {
     TableAngles s = table_angles(v, l, n, k), u = table_angles(v, l, vec3(0.0, 0.0, 1.0), k);
-    float at_x = table_density(x, x_max, m);
+    float at_x = table_density(known, x_max, m);
     vec3 at_s = table_coordinates(s, count), at_u = table_coordinates(u, count);
     vec4 t = table_view(views, at_s.z, at_x, species, count, m);
     vec4 ts = table_view(views, at_s.z, 0.0, species, count, m), tu = table_view(views, at_u.z, 0.0, species, count, m);
@@ -112,8 +113,8 @@ TableForest table_forest(sampler3D pairs, sampler2DArray views, vec3 v, vec3 l, 
         vec4 p = table_pair(pairs, at_s, at_x, species, count, m);
         vec4 ps = table_pair(pairs, at_s, 0.0, species, count, m), pu = table_pair(pairs, at_u, 0.0, species, count, m);
         f.joint = max(x * (s.sec_v * view_path + s.sec_l * light_path) * p.x, f.seen);
-        // Of the sheared crowns.
-        float seen = x * s.sec_v * t.x, joint = max(x * (s.sec_v + s.sec_l) * p.x, seen);
+        // Of the sheared crowns, and of the species alone.
+        float seen = known * s.sec_v * t.x, joint = max(known * (s.sec_v + s.sec_l) * p.x, seen);
         float layer = (mean_through(f.joint) * mean_through(seen)) / (mean_through(joint) * mean_through(f.seen));
         float change = layer * (pu.y + pu.z) / max(ps.y + ps.z, 1e-3);
         f.sun = p.yz * min(change, 1.0 / max(p.y + p.z, 1e-6));

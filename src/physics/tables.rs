@@ -291,19 +291,27 @@ fn mean_through(x: f64) -> f64 {
     if x < 1e-6 { 1.0 - 0.5 * x } else { -(-x).exp_m1() / x }
 }
 
-/// What is seen along v of trees of optical thickness x, lit from l, on a slope of unit normal n: see the module's head.
-pub fn forest(t: &ForestTables, v: [f64; 3], l: [f64; 3], n: [f64; 3], x: f64) -> Forest {
+/// Thickness x'_k = Σ_j x_j min(1, A_k/A_j) of a forest of species `k` alone in which trees' keeping apart changes as much of what
+/// crowns cover as it does in a mix of species with thicknesses `x` and mean areas `areas`: to second order in the densities it
+/// changes Σ_ij λ_i λ_j min(A_i, A_j), the area that two crowns would share being at most that of the smaller.
+pub fn alike(k: usize, x: &[f64], areas: &[f64]) -> f64 {
+    x.iter().zip(areas).map(|(x, area)| x * (areas[k] / area).min(1.0)).sum()
+}
+
+/// What is seen along v of trees of optical thickness x, lit from l, on a slope of unit normal n: see the module's head. The tables
+/// are read at the thickness `known`: x where the species stands alone, and [`alike`] in a mix.
+pub fn forest(t: &ForestTables, v: [f64; 3], l: [f64; 3], n: [f64; 3], x: f64, known: f64) -> Forest {
     let [s, u] = [n, [0.0, 0.0, 1.0]].map(|n| angles(v, l, n, f64::from(t.vertical_scale)));
     // Paths of single crowns, over those of sheared ones.
     let [v0, l0] = [[s.v, u.v], [s.l, u.l]].map(|a| a.map(|a| view(t, a, 0.0)));
     let ratio = |[s0, u0]: [[f64; 4]; 2], k: usize| u.lengths[k] * u0[0] / (s.lengths[k] * s0[0]);
     let (view_path, light_path) = (ratio(v0, 0), ratio(l0, 1));
-    let [path, leaf, bark, coverage] = view(t, s.v, x);
-    let [w, lit_leaf, lit_bark, transfer] = pair(t, s.v, s.l, s.phi, x);
+    let [path, leaf, bark, coverage] = view(t, s.v, known);
+    let [w, lit_leaf, lit_bark, transfer] = pair(t, s.v, s.l, s.phi, known);
     let [s0, u0] = [s, u].map(|a| pair(t, a.v, a.l, a.phi, 0.0));
-    let sheared = x * s.sec_v * path;
-    let sheared_joint = (x * (s.sec_v + s.sec_l) * w).max(sheared);
-    let seen = sheared * view_path;
+    let sheared = known * s.sec_v * path;
+    let sheared_joint = (known * (s.sec_v + s.sec_l) * w).max(sheared);
+    let seen = x * s.sec_v * path * view_path;
     let joint = (x * (s.sec_v * view_path + s.sec_l * light_path) * w).max(seen);
     let layer =
         mean_through(joint) * mean_through(sheared) / (mean_through(sheared_joint) * mean_through(seen));

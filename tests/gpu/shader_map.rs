@@ -84,7 +84,7 @@ fn oracle(
 ) -> [[f64; 4]; 3] {
     let l = sun_direction(&scene.sun);
     let level = density * f64::from(row.mean_area);
-    let f = tables::forest(t, v, l, n, level);
+    let f = tables::forest(t, v, l, n, level, level);
     let (open, joint) = ((-f.seen).exp(), (-f.joint).exp());
     let ([leaf, bark], [sky_leaf, sky_bark], seen_coverage) = (f.sun, f.sky, f.coverage);
     let [sky, coverage] = tables::ground(t, level);
@@ -186,6 +186,81 @@ fn a_forest_far_away_is_what_the_tables_say() {
     // The same of the terms of a sum; L reaches 3 where it matters at all; tables, slopes and radiance are half floats.
     sun.within((3.0 * 3.0 + 4.0) / 2048.0, "sunlight");
     sky.within((3.0 * 3.0 + 4.0) / 2048.0, "skylight");
+    gpu.close().unwrap();
+}
+
+/// Fractions of a level mix of species, of `densities`, as the tables have them in f64.
+fn mixed(
+    scene: &Scene,
+    tables: &[Arc<ForestTables>],
+    rows: &[Species],
+    densities: &[f64],
+    v: [f64; 3],
+) -> [f64; 4] {
+    let (l, up) = (sun_direction(&scene.sun), [0.0, 0.0, 1.0]);
+    let areas: Vec<f64> = rows.iter().map(|r| f64::from(r.mean_area)).collect();
+    let x: Vec<f64> = densities.iter().zip(&areas).map(|(d, a)| d * a).collect();
+    let total: f64 = x.iter().sum();
+    let [mut seen, mut joint, mut lit] = [0.0; 3];
+    for (k, t) in tables.iter().enumerate() {
+        let f = tables::forest(t, v, l, up, total, tables::alike(k, &x, &areas));
+        let share = x[k] / total;
+        seen += share * f.seen;
+        joint += share * f.joint;
+        lit += share * f.seen * (f.sun[0] + f.sun[1]);
+    }
+    let (open, joint, lit) = ((-seen).exp(), (-joint).exp(), lit / seen);
+    [joint, open - joint, (1.0 - open) * lit, (1.0 - open) * (1.0 - lit)]
+}
+
+/// A mix is what its species' tables say together; and undergrowth that covers half a per cent of what the large trees do changes no
+/// light on them, however many small trees it has. (Looked up by the number of all trees, the large ones' light was that of a
+/// forest three times as dense.)
+#[test]
+fn a_mix_of_large_and_small_trees_is_what_their_tables_say() {
+    let gpu = device::open();
+    let (mut fractions, mut alone) = (Worst::default(), Worst::default());
+    let densities = [0.02, 0.04];
+    for scale in [0.6, 0.05] {
+        let mut scene = plain(densities[0], 40.0, 0.0);
+        scene.settings.set("samples", 1.0).unwrap();
+        let mut small = scene.species[0].clone();
+        small.name = "b".into();
+        small.scale = [scale; 2];
+        small.distribution = Distribution::Density {
+            max_density: densities[1] as f32,
+            map: None,
+            between_heights: None,
+            below_slope: None,
+        };
+        scene.species.push(small);
+        let tables: Vec<Arc<ForestTables>> = device::bake(&scene).iter().map(|b| b.tables.clone()).collect();
+        let at = |view| eye(&scene, view, 30_000.0, 200.0);
+        let mut renderer = renderer(&gpu, &scene, &at((0.0, 0.0)), Ladder::SHADER_MAP);
+        let rows = renderer.forest().unwrap().species.rows.clone();
+        for view in [(0.0, 0.0), (35.0, 180.0), (45.0, 70.0)] {
+            let eye = at(view);
+            renderer.render_eye(&eye, 1.0).unwrap();
+            let l = renderer.picture().unwrap().linear.unwrap();
+            let k = l.sun.len() / 2 + SIZE[0] as usize / 2;
+            let v = unit(ray(&eye, k)).map(|c| -c);
+            let want = mixed(&scene, &tables, &rows, &densities, v);
+            let one = oracle(&scene, &tables[0], &rows[0], densities[0], v, [0.0, 0.0, 1.0])[0];
+            for c in 0..4 {
+                let got = f64::from(l.fractions[k][c]);
+                let at = || format!("scale {scale}, {view:?}: {:?}, {want:?}, alone {one:?}", l.fractions[k]);
+                fractions.note((got - want[c]).abs(), at);
+                if scale < 0.1 {
+                    alone.note((got - one[c]).abs(), at);
+                }
+            }
+        }
+    }
+    // As in the test of one species; the shader adds 1e-4 to each thickness, of 0.1 and more, to which paths are in proportion.
+    let bound = (3.0 / std::f64::consts::E + 3.0) / 2048.0 + 2e-4 + 2e-3 / std::f64::consts::E;
+    fractions.within(bound, "fractions");
+    // A path grows by 0.005 of it at most, and exp(-L) changes by 1/e of that.
+    alone.within(0.005 / std::f64::consts::E + bound, "beside trees alone");
     gpu.close().unwrap();
 }
 
