@@ -10,7 +10,7 @@ use crate::{Error, Result};
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// What the validation layers watch. Messages are kept for [`Gpu::messages`], and [`Gpu::close`] fails with them.
+/// What the validation layers watch. Messages are kept for [`super::Gpu::messages`], and [`super::Gpu::close`] fails with them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Validation {
     /// Nothing: the layers are not loaded.
