@@ -202,7 +202,7 @@ fn open(root: Root, physical: vk::PhysicalDevice, info: DeviceInfo, failures: Fa
             as u32;
         let queue_info =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
-        let calibration = calibration_extension(&root._entry, &instance, physical);
+        let calibration = calibration_extension(&root.entry, &instance, physical);
         let push = info.push_descriptors.then_some(khr::push_descriptor::NAME);
         let extensions: Vec<_> = [push, calibration].into_iter().flatten().map(CStr::as_ptr).collect();
         let features =

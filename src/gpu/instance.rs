@@ -46,12 +46,12 @@ impl Validation {
 /// The instance, and what listens to its validation layers.
 pub(super) struct Root {
     pub messages: Arc<Mutex<Vec<String>>>,
-    pub messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     /// Whether objects can be named.
     pub debug_utils: bool,
     pub instance: ash::Instance,
     // Last: the loader must outlive everything made through it.
-    pub _entry: ash::Entry,
+    pub entry: ash::Entry,
 }
 
 impl Root {
@@ -96,10 +96,9 @@ impl Root {
         let instance = unsafe { entry.create_instance(&create, None) }
             .map_err(|e| Error::NoDevice(format!("no Vulkan instance: {e}")))?;
 
-        let mut root =
-            Root { messages: Arc::default(), messenger: None, debug_utils, instance, _entry: entry };
+        let mut root = Root { messages: Arc::default(), messenger: None, debug_utils, instance, entry };
         if validate {
-            root.messenger = Some(listen(&root._entry, &root.instance, &root.messages)?);
+            root.messenger = Some(listen(&root.entry, &root.instance, &root.messages)?);
         }
         Ok(root)
     }

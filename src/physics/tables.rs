@@ -294,12 +294,12 @@ fn mean_through(x: f64) -> f64 {
 /// Thickness x'_k = Σ_j x_j min(1, A_k/A_j) of a forest of species `k` alone in which trees' keeping apart changes as much of what
 /// crowns cover as it does in a mix of species with thicknesses `x` and mean areas `areas`: to second order in the densities it
 /// changes Σ_ij λ_i λ_j min(A_i, A_j), the area that two crowns would share being at most that of the smaller.
-pub fn alike(k: usize, x: &[f64], areas: &[f64]) -> f64 {
+pub fn known_thickness(k: usize, x: &[f64], areas: &[f64]) -> f64 {
     x.iter().zip(areas).map(|(x, area)| x * (areas[k] / area).min(1.0)).sum()
 }
 
 /// What is seen along v of trees of optical thickness x, lit from l, on a slope of unit normal n: see the module's head. The tables
-/// are read at the thickness `known`: x where the species stands alone, and [`alike`] in a mix.
+/// are read at the thickness `known`: x where the species stands alone, and [`known_thickness`] in a mix.
 pub fn forest(t: &ForestTables, v: [f64; 3], l: [f64; 3], n: [f64; 3], x: f64, known: f64) -> Forest {
     let [s, u] = [n, [0.0, 0.0, 1.0]].map(|n| angles(v, l, n, f64::from(t.vertical_scale)));
     // Paths of single crowns, over those of sheared ones.

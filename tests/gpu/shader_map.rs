@@ -203,7 +203,7 @@ fn mixed(
     let total: f64 = x.iter().sum();
     let [mut seen, mut joint, mut lit] = [0.0; 3];
     for (k, t) in tables.iter().enumerate() {
-        let f = tables::forest(t, v, l, up, total, tables::alike(k, &x, &areas));
+        let f = tables::forest(t, v, l, up, total, tables::known_thickness(k, &x, &areas));
         let share = x[k] / total;
         seen += share * f.seen;
         joint += share * f.joint;

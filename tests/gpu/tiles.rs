@@ -101,6 +101,22 @@ fn tiles_show_what_the_graphics_pipeline_shows() {
     gpu.close().unwrap();
 }
 
+/// Drivers end loops after 65,535 turns: what a tile does for each tree that it has nothing to do with must be few of them.
+#[test]
+fn without_lists_tiles_go_through_tens_of_thousands_of_trees() {
+    let gpu = device::open();
+    let scene = woods(2500.0, 0.01);
+    let drawing = Drawing { ladder: Some(Ladder::ZFIELD), rasterizer: Some(Rasterizer::Tiles) };
+    let listed = plan(&gpu, &scene, [32, 24], true, drawing);
+    let (report, with_lists) = draw(&gpu, &scene, listed.clone()).unwrap();
+    assert!(report.trees.camera > 30_000, "{} trees are too few to tell", report.trees.camera);
+    let mut short = Plan { tile_steps: 0, ..listed };
+    short.list(&scene);
+    let (_, whole) = draw(&gpu, &scene, short).unwrap();
+    assert!(whole == with_lists, "without lists other bits are drawn");
+    gpu.close().unwrap();
+}
+
 #[test]
 fn long_lists_are_gone_through_to_the_end_and_without_lists_all_trees_are() {
     let gpu = device::open();

@@ -45,9 +45,9 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         f.over += part;
         f.converged += path * converged(relative, view.v.convergence);
         f.seen_coverage += share * t.coverage;
-        float alike = share * total / known;
-        f.sky -= alike * log(max(g.x, 1e-6));
-        f.gap -= alike * log(max(1.0 - g.y, 1e-6));
+        float grown = thickness[k] / known;
+        f.sky -= grown * log(max(g.x, 1e-6));
+        f.gap -= grown * log(max(1.0 - g.y, 1e-6));
         // Where nothing is handed over yet no tree is shown, but the mix must stay defined.
         float weight = max(part, 1e-6 * path);
         vec3 leaf = (0.25 * (1.0 + n.z)) * s.albedo * view.v.sky_radiance;

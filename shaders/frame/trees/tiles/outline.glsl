@@ -1,11 +1,10 @@
 // Pixels of a tile at which anything may be seen of a tree: those of its box at which one of its three views has any opacity where
-// the search starts, by the views' outlines (src/forest/outlines.rs). At the others the search would stay where it starts and find
+// the search starts, by the views' outlines (src/physics/outline.rs). At the others the search would stay where it starts and find
 // nothing.
 //
-// Where the ray of a pixel starts in a view is (U, V) / H, with U, V and H linear in the pixel's column and row: u <= 1/2 + ... is a
-// half plane, and a row of pixels is in an interval of u from one column to another.
+// Where the ray of a pixel starts in a view is (U, V) / H, with U, V and H linear in the pixel's column and row. So u >= c, which is
+// U - c H >= 0, holds in a row of pixels on one side of a column, and an interval of u from one column to another.
 
-layout(constant_id = 2) const bool SHORTCUTS = true; // without, hidden trees and all of their boxes are looked at too, to the same bits
 layout(constant_id = 3) const uint OUTLINE_ROWS = 16u;
 layout(constant_id = 4) const uint VIEW_LEVELS = 9u;
 
@@ -23,7 +22,7 @@ void narrow(float f0, float f1, inout vec2 columns) {
 vec2 outline_interval(usamplerBuffer outlines, int first, float low, float high) {
     int row = int(clamp(low, 0.0, float(OUTLINE_ROWS - 1u))), rows = int(clamp(high, 0.0, float(OUTLINE_ROWS - 1u))) - row;
     uint word = texelFetch(outlines, first + row).x;
-    uint bytes = rows >= 4 || !SHORTCUTS ? 0xff00u : (rows < 2 ? word : word >> 16u);
+    uint bytes = rows < 2 ? word : (rows < 4 ? word >> 16u : 0xff00u);
     uint least = bytes & 0xffu, greatest = bytes >> 8u & 0xffu;
     return vec2(least == 0u ? -1e4 : float(least) * (1.0 / 128.0) - 0.5, greatest == 255u ? 1e4 : float(greatest) * (1.0 / 128.0) - 0.5);
 }

@@ -13,7 +13,7 @@
 #include "frame/samples.glsl"
 #include "frame/tile.glsl"
 
-const uint PART = 512u;        // trees of a part of a list
+const uint PART = 1024u;       // trees of a part of a list
 const uint WORDS = PART / 32u; // of bits a pixel
 // Drivers end loops in silence after 65,535 turns of all loops of an invocation together (llvmpipe): before, a tile gives up aloud.
 const uint MOST_TURNS = 60000u;
@@ -31,16 +31,28 @@ layout(binding = 9) uniform usamplerBuffer outlines; // of views
 layout(push_constant) uniform Push { TileParameters p; };
 layout(constant_id = 0) const uint SAMPLES = 4u;
 layout(constant_id = 1) const uint ESTIMATES = 1u;
+layout(constant_id = 2) const bool SHORTCUTS = true; // without, hidden trees and all of their boxes are looked at too, to the same bits
 
-shared uvec2 shown[PART];         // of each tree, the pixels that may see it: eight bits a row
-shared uint pixels[WORDS * 64u];  // of each pixel, which of 32 trees it may see
+// Of each pixel, which of 32 trees it may see: of a word of trees eight columns, of a column eight rows.
+shared uint pixels[WORDS * 64u];
 shared uint left; // whether a pixel may see trees of the next part
 
-// Pixels of a tile that may see a tree.
-uvec2 pixels_of(uint tree, uvec2 corner) {
+// All of the first rows of a tile, eight bits a row.
+uvec2 first_rows(int rows) {
+    ivec2 some = clamp(ivec2(rows, rows - 4), 0, 4);
+    return uvec2(some.x == 4 ? ~0u : (1u << uint(8 * some.x)) - 1u, some.y == 4 ? ~0u : (1u << uint(8 * some.y)) - 1u);
+}
+
+// Pixels of a tile that may see a tree: of its box, and with `by_outline` of its outline.
+uvec2 pixels_of(uint tree, uvec2 corner, bool by_outline) {
     uvec2 b = texelFetch(boxes, int(tree)).xy;
     ivec4 box = clamp(ivec4(b.x & 0xffffu, b.x >> 16u, b.y & 0xffffu, b.y >> 16u) - ivec4(corner, corner), ivec4(0), ivec4(8));
-    return outlined_pixels(outlines, unpack_sight(records, tree), vec2(corner), box);
+    uint columns = ((1u << uint(box.z)) - (1u << uint(box.x))) * 0x1010101u;
+    uvec2 boxed = columns & first_rows(box.w) & ~first_rows(box.y);
+    // No rows rather than no call, because drivers without branches run both sides of those.
+    box.w = by_outline ? box.w : box.y;
+    uvec2 outlined = outlined_pixels(outlines, unpack_sight(records, tree), vec2(corner), box);
+    return by_outline ? outlined : boxed;
 }
 
 uint tree_at(bool whole, uint place, uint end) {
@@ -48,27 +60,53 @@ uint tree_at(bool whole, uint place, uint end) {
     return whole ? place : texelFetch(entries, int(place)).x;
 }
 
-// Notes which trees of a part each pixel of a column may see: of four trees in a row, and across eight such words.
-void note_pixels(bool whole, uint begin, uint count, uint end, uvec2 corner, uint column) {
+// Swaps the upper parts of `a` with the lower of `b`.
+void swap_parts(inout uint a, inout uint b, uint shift, uint mask) {
+    uint other = (a >> shift ^ b) & mask;
+    b ^= other;
+    a ^= other << shift;
+}
+
+// Makes of eight words of eight nibbles their transpose.
+void transpose_nibbles(inout uint m[8]) {
+    for (int k = 0; k < 4; k++) swap_parts(m[k], m[k + 4], 16u, 0xffffu);
+    for (int k = 0; k < 4; k++) swap_parts(m[k + (k & 2)], m[k + (k & 2) + 2], 8u, 0xff00ffu);
+    for (int k = 0; k < 4; k++) swap_parts(m[2 * k], m[2 * k + 1], 4u, 0xf0f0f0fu);
+}
+
+// Eight bits as the lowest of eight nibbles.
+uint spread(uint bits) {
+    bits = (bits | bits << 12u) & 0xf000fu;
+    bits = (bits | bits << 6u) & 0x3030303u;
+    return (bits | bits << 3u) & 0x11111111u;
+}
+
+// Notes which trees of a part each pixel may see. Of 32 trees an invocation looks at four, one bit each of a nibble for every pixel,
+// and gives them to the invocations of the pixels' columns, which put the eight nibbles of a pixel together. Returns the turns that this
+// took at most. Long lists do without outlines: each row of a box would be a turn.
+uint note_pixels(bool whole, uint begin, uint count, uint end, uvec2 corner, uint column, bool by_outline) {
     uint words = (count + 31u) / 32u;
     for (uint word = 0u; word < words; word++) {
+        uint m[8] = uint[](0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
         for (uint k = 0u; k < 4u; k++) {
             uint place = word * 32u + column * 4u + k;
-            uvec2 some = pixels_of(tree_at(whole, begin + place, end), corner);
-            shown[place] = place < count ? some : uvec2(0u);
+            uvec2 some = pixels_of(tree_at(whole, begin + place, end), corner, by_outline);
+            some = place < count ? some : uvec2(0u);
+            for (int row = 0; row < 8; row++) m[row] |= spread((row < 4 ? some.x : some.y) >> uint(8 * (row & 3)) & 0xffu) << k;
         }
+        transpose_nibbles(m);
+        for (uint k = 0u; k < 8u; k++) pixels[word * 64u + k * 8u + column] = m[k];
     }
     barrier();
     left = 0u;
     for (uint word = 0u; word < words; word++) {
-        uint rows[8] = uint[](0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
-        for (uint k = 0u; k < 32u; k++) {
-            uvec2 some = shown[word * 32u + k] >> column;
-            for (uint row = 0u; row < 8u; row++) rows[row] |= ((row < 4u ? some.x : some.y) >> (8u * (row & 3u)) & 1u) << k;
-        }
-        for (uint row = 0u; row < 8u; row++) pixels[word * 64u + row * 8u + column] = rows[row];
+        uint m[8];
+        for (uint k = 0u; k < 8u; k++) m[k] = pixels[word * 64u + column * 8u + k];
+        transpose_nibbles(m);
+        for (uint row = 0u; row < 8u; row++) pixels[word * 64u + column * 8u + row] = m[row];
     }
     barrier();
+    return (by_outline ? 6u + 4u * TILE_SIDE : 6u) * words;
 }
 
 // Samples of one tree at a pixel, and their depth as the depth buffer holds it.
@@ -115,7 +153,7 @@ struct Next {
 uint find_next(inout Next next, float farthest, bool whole, uint begin, uint words, uint end, uint column, uint row) {
     uint first = next.word;
     while (next.trees == 0u && next.word < words && !next.done) {
-        next.trees = pixels[next.word * 64u + row * 8u + column];
+        next.trees = pixels[next.word * 64u + column * 8u + row];
         next.word++;
     }
     next.done = next.done || next.trees == 0u;
@@ -141,8 +179,7 @@ void main() {
     bool more = true, parted = end > first + PART;
     for (uint begin = first; more; begin += PART) {
         uint count = min(end - min(begin, end), PART), words = (count + 31u) / 32u;
-        note_pixels(whole, begin, count, end, corner, column);
-        turns += (4u * (1u + TILE_SIDE) + 32u) * words;
+        turns += note_pixels(whole, begin, count, end, corner, column, SHORTCUTS && !parted);
         bool open = false;
         for (uint row = 0u; row < TILE_SIDE; row++) {
             uvec2 pixel = corner + uvec2(column, row);
