@@ -17,7 +17,7 @@ struct Fault {
 const FAULTS: &[Fault] = &[
     Fault {
         name: "a barrier that makes no write available",
-        file: "src/gpu/record.rs",
+        file: "src/gpu/record/mod.rs",
         from: ".src_access_mask(vk::AccessFlags2::MEMORY_WRITE)",
         to: ".src_access_mask(vk::AccessFlags2::NONE)",
         case: "validation/synchronization",
@@ -87,6 +87,26 @@ const FAULTS: &[Fault] = &[
     },
 ];
 
+impl Fault {
+    /// Its file with the fault.
+    fn planted(&self, sources: &Path) -> String {
+        let text = std::fs::read_to_string(sources.join(self.file))
+            .unwrap_or_else(|e| panic!("{}: {}: {e}", self.name, self.file));
+        assert_eq!(text.matches(self.from).count(), 1, "{}: {} has moved on", self.name, self.file);
+        text.replace(self.from, self.to)
+    }
+}
+
+/// Every fault has its place in the sources, and the case that must catch it is one: what moves must take them along.
+#[test]
+fn faults_have_their_places() {
+    let cases = canopy::measure::conform::cases();
+    for fault in FAULTS {
+        fault.planted(Path::new(env!("CARGO_MANIFEST_DIR")));
+        assert!(cases.iter().any(|c| c.name == fault.case), "{}: no case {}", fault.name, fault.case);
+    }
+}
+
 /// The sources, as git knows them, in a folder of their own.
 fn copy() -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -116,9 +136,7 @@ fn each_planted_fault_is_caught_by_a_named_case() {
     for fault in FAULTS {
         let sources = copy();
         let path = sources.join(fault.file);
-        let text = std::fs::read_to_string(&path).unwrap();
-        assert_eq!(text.matches(fault.from).count(), 1, "{}: {} has moved on", fault.name, fault.file);
-        std::fs::write(&path, text.replace(fault.from, fault.to)).unwrap();
+        std::fs::write(&path, fault.planted(&sources)).unwrap();
         let target = folder().join("planted-target");
         let built = Command::new(env!("CARGO"))
             .args(["build", "--release", "--locked", "--bin", "canopy", "--quiet"])
