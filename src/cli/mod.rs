@@ -1,5 +1,6 @@
 //! The command line: one file a command, and no logic that the library does not have.
 
+mod accuracy;
 mod bake;
 mod bench;
 mod compare;
@@ -54,6 +55,8 @@ enum Command {
     Difference(difference::Args),
     /// Radiance of a patch of the scene's forest against view angle, sun angle and distance, as CSV.
     Reflectance(reflectance::Args),
+    /// Errors against path tracing for forests of many kinds, suns and slopes: which are worst, and which term of the model is wrong.
+    Accuracy(accuracy::Args),
     /// Precompute a tree model ahead of time (otherwise done on first use), and measure how good it is.
     Bake(bake::Args),
     /// Write a procedural tree as binary glTF.
@@ -75,6 +78,7 @@ pub fn run() -> ExitCode {
         Command::Sweep(args) => sweep::run(&args),
         Command::Difference(args) => difference::run(&args),
         Command::Reflectance(args) => reflectance::run(&args),
+        Command::Accuracy(args) => accuracy::run(&args),
         Command::Bake(args) => bake::run(&args),
         Command::Tree(args) => tree::run(&args),
         Command::Plan(args) => plan::run(&args),

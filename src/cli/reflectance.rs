@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use canopy::bake::{Baked, Needs, cache, load_or_bake_scene};
 use canopy::gpu::Gpu;
 use canopy::ladder::Ladder;
-use canopy::measure::reflectance::{Measured, Method, Request, mean_densities, measure, measure_reference};
+use canopy::measure::reflectance::{
+    Measured, Method, Request, mean_densities, measure, measure_reference, sees,
+};
 use canopy::progress::Progress;
 use canopy::reference::Until;
 use canopy::scene::{Camera, Scene};
@@ -289,12 +291,6 @@ fn all(args: &Args, scene: &Scene, camera: &Camera, densities: &[f64]) -> Result
     let rows = if renders { args.device.with(|gpu| work(Some(gpu))) } else { work(None) }?;
     progress.finish();
     Ok(rows)
-}
-
-/// Whether a slope shows its face to a view direction, by five degrees at least.
-fn sees([zenith, azimuth]: [f64; 2], slope: f64) -> bool {
-    let (z, a, s) = (zenith.to_radians(), azimuth.to_radians(), slope.to_radians());
-    z.sin() * a.cos() * s.sin() + z.cos() * s.cos() > 5f64.to_radians().sin()
 }
 
 /// A field of a CSV row: quoted where it has commas of its own.

@@ -63,7 +63,7 @@ impl Default for Method {
 }
 
 /// Mean over the patches, and its standard error.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Measured {
     /// View zenith angle and relative azimuth, degrees.
     pub view: [f64; 2],
@@ -276,6 +276,12 @@ fn centres(count: u32, slope: f64) -> Vec<[f64; 2]> {
 fn direction([zenith, azimuth]: [f64; 2]) -> [f64; 3] {
     let (t, a) = (zenith.to_radians(), azimuth.to_radians());
     [t.sin() * a.sin(), -t.sin() * a.cos(), t.cos()]
+}
+
+/// Whether a slope shows its face to a view direction, by five degrees at least.
+pub fn sees([zenith, azimuth]: [f64; 2], slope: f64) -> bool {
+    let (z, a, s) = (zenith.to_radians(), azimuth.to_radians(), slope.to_radians());
+    z.sin() * a.cos() * s.sin() + z.cos() * s.cos() > 5f64.to_radians().sin()
 }
 
 /// How far from its centre the image of a patch shows the ground, m: half its side over the cosine to the ground's normal.

@@ -12,6 +12,7 @@ use super::result::{CameraError, Point, SweepResult};
 use super::run::picture_file;
 use crate::Result;
 use crate::measure::metrics::{Difference, Estimate};
+use crate::measure::page::{escape, head, table};
 use crate::settings::{KNOBS, Knob, PRESETS};
 
 /// Columns of [`csv()`].
@@ -153,19 +154,6 @@ pub fn paper(result: &SweepResult, judged: &Judged) -> Vec<[String; 5]> {
     rows
 }
 
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
-
-fn table<const N: usize>(headings: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> String {
-    let heads: String = headings.map(|h| format!("<th>{}</th>", escape(h))).concat();
-    let mut text = format!("<table><tr>{heads}</tr>\n");
-    for row in rows {
-        text += &format!("<tr>{}</tr>\n", row.map(|c| format!("<td>{}</td>", escape(&c))).concat());
-    }
-    text + "</table>\n"
-}
-
 /// The page. `pictures` is the folder of kept pictures.
 ///
 /// # Errors
@@ -174,12 +162,7 @@ pub fn html(result: &SweepResult, pictures: &Path) -> Result<String> {
     let judged = judge(result);
     let [width, height] = result.identity.size;
     let name = &result.identity.scene.name;
-    let mut page = format!(
-        "<!doctype html><meta charset=\"utf-8\"><title>canopy sweep: {0}</title>\n<style>body{{font:15px sans-serif;margin:2em;\
-         max-width:75em}}table{{border-collapse:collapse}}td,th{{border:1px solid #ccc;padding:2px 8px;text-align:left}}\
-         img{{image-rendering:pixelated}}</style>\n<h1>Time and accuracy: {0}</h1>\n",
-        escape(name)
-    );
+    let mut page = head(&format!("canopy sweep: {name}"), &format!("Time and accuracy: {name}"));
     let h = &result.host;
     page += &format!(
         "<p>{width} × {height}, {} cameras, {} on {} with {} threads, canopy {} ({}). Times are {}, each setting drawn in turn \
