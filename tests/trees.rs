@@ -23,22 +23,37 @@ fn seeds_decide_everything() {
     }
 }
 
+/// Height and range of the crown's radius, m.
+fn size(preset: Preset) -> (f32, std::ops::Range<f32>) {
+    match preset {
+        Preset::Oak => (15.0, 5.0..9.0),
+        Preset::Pine => (20.0, 3.0..6.0),
+        Preset::Birch => (14.0, 2.0..4.5),
+        Preset::Poplar => (22.0, 1.5..3.5),
+        Preset::Acacia => (9.0, 5.0..8.5),
+        Preset::Willow => (11.0, 4.0..7.0),
+        Preset::Ash => (16.0, 5.0..9.0),
+        Preset::Catalpa => (10.0, 4.5..7.5),
+        Preset::Spruce => (24.0, 4.5..6.5),
+        Preset::Snag => (12.0, 3.0..7.0),
+    }
+}
+
 #[test]
 fn trees_keep_to_their_budget_and_size() {
-    for (preset, height, radius) in
-        [(Preset::Oak, 15.0, 5.0..9.0), (Preset::Pine, 20.0, 3.0..6.0), (Preset::Birch, 14.0, 2.0..4.5)]
-    {
+    for preset in Preset::ALL {
+        let (height, radius) = size(preset);
         for seed in 0..8 {
             let mesh = load(preset, seed);
             assert_eq!(mesh.dropped_triangles, 0, "{preset:?} {seed}");
             let triangles = mesh.triangles.len();
-            assert!((5_000..=22_000).contains(&triangles), "{preset:?} {seed}: {triangles} triangles");
+            assert!((5_000..=25_000).contains(&triangles), "{preset:?} {seed}: {triangles} triangles");
             let top = top(&mesh);
             assert!((top / height - 1.0).abs() < 0.12, "{preset:?} {seed}: {top} m");
             let wide = mesh.positions.iter().map(|p| p[0].hypot(p[1])).fold(0.0, f32::max);
             assert!(radius.contains(&wide), "{preset:?} {seed}: crown radius {wide} m");
             let base = mesh.positions.iter().map(|p| p[2]).fold(f32::MAX, f32::min);
-            assert!(base.abs() < 0.3, "{preset:?} {seed}: base at {base} m");
+            assert!((-1.0..0.3).contains(&base), "{preset:?} {seed}: base at {base} m");
         }
     }
 }
@@ -47,17 +62,24 @@ fn trees_keep_to_their_budget_and_size() {
 fn materials_are_bark_and_leaf() {
     for preset in Preset::ALL {
         let mesh = load(preset, 1);
-        let [bark, leaf] = &mesh.materials[..] else { panic!("{:?}", mesh.materials.len()) };
+        let bark = &mesh.materials[0];
         assert_eq!((bark.name.as_str(), bark.foliage, bark.alpha_cutoff), ("bark", false, None));
+        assert!(bark.texture.is_some());
+        if preset == Preset::Snag {
+            assert_eq!(mesh.materials.len(), 1, "a dead tree has no leaves");
+            continue;
+        }
+        let [_, leaf] = &mesh.materials[..] else { panic!("{:?}", mesh.materials.len()) };
         assert_eq!((leaf.name.as_str(), leaf.foliage, leaf.alpha_cutoff), ("leaf", true, Some(0.5)));
-        assert!(leaf.double_sided && leaf.texture.is_some() && bark.texture.is_some());
+        assert!(leaf.double_sided && leaf.texture.is_some());
     }
 }
 
-/// Seen from each of eight sides, the upper crown has leaves: no side is bare.
+/// Seen from each of eight sides, the upper crown has leaves: no side is bare. The ash is meant to have gaps, and the
+/// dead tree no leaves.
 #[test]
 fn crowns_are_full_all_around() {
-    for preset in Preset::ALL {
+    for preset in Preset::ALL.into_iter().filter(|p| !matches!(p, Preset::Ash | Preset::Snag)) {
         for seed in 0..4 {
             let mesh = load(preset, seed);
             let height = top(&mesh);

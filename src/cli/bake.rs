@@ -29,7 +29,7 @@ was damaged (rebuilt).";
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{}", knobs_help()))]
 pub struct Args {
-    /// Model (.glb, .gltf), builtin:oak, builtin:pine, builtin:birch, or a scene file (.toml): its every species
+    /// Model (.glb, .gltf), builtin:NAME of a species of `canopy tree`, or a scene file (.toml): its every species
     model: PathBuf,
     /// Height of an unscaled tree, m; left out: as modelled
     #[arg(long, value_name = "METRES")]

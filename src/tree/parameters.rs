@@ -3,15 +3,27 @@
 //! Left out: segment splits, lobes and pruning; three levels of stems and cards showing whole sprays of leaves make up
 //! for the finer levels.
 
-use super::Preset;
+use serde::Deserialize;
 
-/// The crown's outline: how long a branch is by its place on the trunk (paper, section 4.3).
-#[derive(Clone, Copy, Debug)]
+/// The crown's outline: how long a branch is by its place on the trunk (paper, section 4.3; its flame is left out, at
+/// whose top branches have no length).
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub(super) enum Shape {
     /// Longest below.
     Conical,
+    /// Longest below, to a point; not in the paper.
+    Spire,
     /// Longest in the middle.
     Spherical,
+    /// Longest below, with a round top.
+    Hemispherical,
+    /// The same everywhere.
+    Cylindrical,
+    /// Half as long above as below.
+    TaperedCylindrical,
+    /// Longest above.
+    InverseConical,
     /// A leaf-shaped outline with a narrow base.
     TendFlame,
 }
@@ -21,7 +33,12 @@ impl Shape {
     pub fn ratio(self, ratio: f64) -> f64 {
         match self {
             Shape::Conical => 0.2 + 0.8 * ratio,
+            Shape::Spire => 0.04 + 0.96 * ratio,
             Shape::Spherical => 0.2 + 0.8 * (std::f64::consts::PI * ratio).sin(),
+            Shape::Hemispherical => 0.2 + 0.8 * (std::f64::consts::FRAC_PI_2 * ratio).sin(),
+            Shape::Cylindrical => 1.0,
+            Shape::TaperedCylindrical => 0.5 + 0.5 * ratio,
+            Shape::InverseConical => 1.0 - 0.8 * ratio,
             Shape::TendFlame if ratio <= 0.7 => 0.5 + 0.5 * ratio / 0.7,
             Shape::TendFlame => 0.5 + 0.5 * (1.0 - ratio) / 0.3,
         }
@@ -31,23 +48,58 @@ impl Shape {
 /// A number and its variation, `n ± nV`.
 pub(super) type Varied = [f64; 2];
 
+/// Linear reflectance, red, green, blue.
+pub(super) type Color = [f64; 3];
+
+/// The trunk; angles in degrees.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Trunk {
+    /// As [`Level::length`], relative to the tree's scale.
+    pub length: Varied,
+    /// As [`Level::curve`].
+    #[serde(default)]
+    pub curve: f64,
+    /// As [`Level::curve_back`].
+    #[serde(default)]
+    pub curve_back: f64,
+    /// As [`Level::curve_variation`].
+    pub curve_variation: f64,
+    /// As [`Level::segments`].
+    pub segments: u32,
+    /// As [`Level::taper`].
+    pub taper: f64,
+    /// As [`Level::sides`].
+    pub sides: u32,
+}
+
 /// The stems of one level; angles in degrees. Level 0 is the trunk.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Level {
     /// `nBranches`: stems of this level on the longest stem of the level below.
-    pub branches: f64,
+    pub count: f64,
     /// `nLength`, relative to the tree (trunk) or to the parent.
     pub length: Varied,
     /// `nDownAngle` from the parent's axis; a negative variation makes it depend on the place on the parent.
     pub down_angle: Varied,
-    /// `nRotate` about the parent from one stem to the next.
+    /// `nRotate` about the parent from one stem to the next; negative: to alternate sides.
     pub rotate: Varied,
     /// `nCurve`: the bend from base to tip, of the first half if there is a `curve_back`.
+    #[serde(default)]
     pub curve: f64,
     /// `nCurveBack`: the bend of the second half, or 0.
+    #[serde(default)]
     pub curve_back: f64,
     /// `nCurveV`: random bend, spread over the segments.
     pub curve_variation: f64,
+    /// How far the stem turns towards the ground, however it lies; negative: towards the sky. Not in the paper, whose
+    /// attraction leaves stems alone whose plane of bending is level.
+    #[serde(default)]
+    pub droop: f64,
+    /// Part of the stem, from its base, that bears nothing.
+    #[serde(default)]
+    pub bare: f64,
     /// `nCurveRes`: segments of a stem.
     pub segments: u32,
     /// `nTaper`: 0 a cylinder, 1 a cone.
@@ -56,8 +108,25 @@ pub(super) struct Level {
     pub sides: u32,
 }
 
+/// The blade of a leaf.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Blade {
+    /// Rounded lobes, as an oak's.
+    Lobed,
+    /// Triangular with a drawn-out tip, as a birch's.
+    Ovate,
+    /// Nearly round, widest near its base, as a catalpa's.
+    Heart,
+    /// Long and narrow, as a willow's.
+    Lance,
+    /// Shoots bristling with needles.
+    Needles,
+}
+
 /// The leaf cards, each showing a spray.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Leaves {
     /// `Leaves`: sprays on a stem of the last level.
     pub count: f64,
@@ -69,10 +138,54 @@ pub(super) struct Leaves {
     pub down_angle: Varied,
     /// Angle about the stem from one spray to the next, degrees.
     pub rotate: Varied,
+    /// Cards of a spray: one, or two crossed.
+    pub cards: u32,
+    /// What is drawn on the card.
+    pub blade: Blade,
+    /// Pairs of leaves, or of side shoots with needles, on a spray.
+    pub pairs: u32,
+    /// Pairs of leaflets of a compound leaf; 0: leaves are simple.
+    #[serde(default)]
+    pub leaflets: u32,
+    /// Length of a leaf, and half its width or that of a leaflet, in card sizes.
+    pub blade_size: [f64; 2],
+    /// Colour.
+    pub color: Color,
+    /// Which random drawing.
+    pub drawing: u32,
+}
+
+/// What bark looks like.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Relief {
+    /// Deep fissures along the trunk, as an oak's.
+    Fissured,
+    /// Plates, as a pine's.
+    Plated,
+    /// Even, as a birch's.
+    Smooth,
+}
+
+/// The bark's texture.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Bark {
+    /// Its relief.
+    pub relief: Relief,
+    /// Colour of its depths.
+    pub dark: Color,
+    /// Colour of its heights.
+    pub light: Color,
+    /// Colour of lenticels across and of patches over it, if there are any.
+    pub spots: Option<Color>,
+    /// Height that one repeat of the texture covers, m; it is half as wide.
+    pub repeat: f64,
 }
 
 /// A species.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Parameters {
     /// `Shape` of the crown.
     pub shape: Shape,
@@ -88,182 +201,37 @@ pub(super) struct Parameters {
     pub flare: f64,
     /// `AttractionUp`: how much stems from the second level on turn up; negative, they hang.
     pub attraction_up: f64,
-    /// Trunk, branches, twigs.
-    pub levels: [Level; 3],
-    /// The leaves on the twigs.
-    pub leaves: Leaves,
-    /// Height that one repeat of the bark texture covers, m; it is half as wide.
-    pub bark_repeat: f64,
+    /// Level 0.
+    pub trunk: Trunk,
+    /// Level 1, on the trunk.
+    pub branches: Level,
+    /// Level 2, on the branches.
+    pub twigs: Level,
+    /// The leaves on the twigs; without them the tree is bare.
+    pub leaves: Option<Leaves>,
+    /// The bark.
+    pub bark: Bark,
 }
 
-/// The parameters of a preset.
-pub(super) fn of(preset: Preset) -> Parameters {
-    match preset {
-        Preset::Oak => Parameters {
-            shape: Shape::Spherical,
-            base_size: 0.16,
-            scale: [13.2, 0.5],
-            ratio: 0.026,
-            ratio_power: 1.3,
-            flare: 0.6,
-            attraction_up: 0.25,
-            levels: [
-                Level {
-                    branches: 1.0,
-                    length: [0.92, 0.0],
-                    down_angle: [0.0, 0.0],
-                    rotate: [0.0, 0.0],
-                    curve: 0.0,
-                    curve_back: 0.0,
-                    curve_variation: 24.0,
-                    segments: 9,
-                    taper: 1.0,
-                    sides: 12,
-                },
-                Level {
-                    branches: 36.0,
-                    length: [0.54, 0.05],
-                    down_angle: [64.0, -28.0],
-                    rotate: [140.0, 18.0],
-                    curve: -25.0,
-                    curve_back: 20.0,
-                    curve_variation: 55.0,
-                    segments: 6,
-                    taper: 1.0,
-                    sides: 6,
-                },
-                Level {
-                    branches: 18.0,
-                    length: [0.40, 0.08],
-                    down_angle: [48.0, 14.0],
-                    rotate: [140.0, 35.0],
-                    curve: -10.0,
-                    curve_back: 0.0,
-                    curve_variation: 80.0,
-                    segments: 2,
-                    taper: 1.0,
-                    sides: 3,
-                },
-            ],
-            leaves: Leaves {
-                count: 5.0,
-                length: 0.72,
-                width: 0.9,
-                down_angle: [42.0, 18.0],
-                rotate: [140.0, 40.0],
-            },
-            bark_repeat: 1.6,
-        },
-        Preset::Pine => Parameters {
-            shape: Shape::Conical,
-            base_size: 0.1,
-            scale: [19.2, 0.6],
-            ratio: 0.014,
-            ratio_power: 1.3,
-            flare: 0.4,
-            attraction_up: 0.15,
-            levels: [
-                Level {
-                    branches: 1.0,
-                    length: [1.0, 0.0],
-                    down_angle: [0.0, 0.0],
-                    rotate: [0.0, 0.0],
-                    curve: 0.0,
-                    curve_back: 0.0,
-                    curve_variation: 12.0,
-                    segments: 8,
-                    taper: 1.0,
-                    sides: 10,
-                },
-                Level {
-                    branches: 70.0,
-                    length: [0.2, 0.02],
-                    down_angle: [78.0, -22.0],
-                    rotate: [140.0, 20.0],
-                    curve: -22.0,
-                    curve_back: 0.0,
-                    curve_variation: 30.0,
-                    segments: 4,
-                    taper: 1.0,
-                    sides: 4,
-                },
-                Level {
-                    branches: 15.0,
-                    length: [0.36, 0.05],
-                    down_angle: [60.0, -18.0],
-                    rotate: [-160.0, 40.0],
-                    curve: -12.0,
-                    curve_back: 0.0,
-                    curve_variation: 30.0,
-                    segments: 2,
-                    taper: 1.0,
-                    sides: 3,
-                },
-            ],
-            leaves: Leaves {
-                count: 3.0,
-                length: 0.78,
-                width: 0.74,
-                down_angle: [38.0, 15.0],
-                rotate: [140.0, 30.0],
-            },
-            bark_repeat: 1.4,
-        },
-        Preset::Birch => Parameters {
-            shape: Shape::TendFlame,
-            base_size: 0.18,
-            scale: [12.6, 0.4],
-            ratio: 0.012,
-            ratio_power: 1.4,
-            flare: 0.35,
-            attraction_up: -0.45,
-            levels: [
-                Level {
-                    branches: 1.0,
-                    length: [1.0, 0.0],
-                    down_angle: [0.0, 0.0],
-                    rotate: [0.0, 0.0],
-                    curve: 0.0,
-                    curve_back: 0.0,
-                    curve_variation: 14.0,
-                    segments: 9,
-                    taper: 1.0,
-                    sides: 10,
-                },
-                Level {
-                    branches: 42.0,
-                    length: [0.25, 0.04],
-                    down_angle: [50.0, -18.0],
-                    rotate: [140.0, 25.0],
-                    curve: -15.0,
-                    curve_back: 55.0,
-                    curve_variation: 60.0,
-                    segments: 5,
-                    taper: 1.0,
-                    sides: 5,
-                },
-                Level {
-                    branches: 16.0,
-                    length: [0.36, 0.08],
-                    down_angle: [52.0, 15.0],
-                    rotate: [140.0, 35.0],
-                    curve: 10.0,
-                    curve_back: 0.0,
-                    curve_variation: 50.0,
-                    segments: 3,
-                    taper: 1.0,
-                    sides: 3,
-                },
-            ],
-            leaves: Leaves {
-                count: 4.0,
-                length: 0.5,
-                width: 0.8,
-                down_angle: [45.0, 18.0],
-                rotate: [140.0, 40.0],
-            },
-            bark_repeat: 1.6,
-        },
+impl Parameters {
+    /// Trunk, branches, twigs.
+    pub fn levels(&self) -> [Level; 3] {
+        let Trunk { length, curve, curve_back, curve_variation, segments, taper, sides } = self.trunk;
+        let upright = Level {
+            count: 1.0,
+            length,
+            down_angle: [0.0; 2],
+            rotate: [0.0; 2],
+            curve,
+            curve_back,
+            curve_variation,
+            droop: 0.0,
+            bare: 0.0,
+            segments,
+            taper,
+            sides,
+        };
+        [upright, self.branches, self.twigs]
     }
 }
 
@@ -273,7 +241,17 @@ mod tests {
 
     #[test]
     fn shape_ratios_are_continuous_and_positive() {
-        for shape in [Shape::Conical, Shape::Spherical, Shape::TendFlame] {
+        use Shape::*;
+        for shape in [
+            Conical,
+            Spire,
+            Spherical,
+            Hemispherical,
+            Cylindrical,
+            TaperedCylindrical,
+            InverseConical,
+            TendFlame,
+        ] {
             for i in 0..1000 {
                 let (a, b) = (f64::from(i) / 1000.0, f64::from(i + 1) / 1000.0);
                 assert!(

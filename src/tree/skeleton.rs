@@ -54,9 +54,10 @@ pub(super) struct Skeleton {
 pub(super) fn grow(parameters: &Parameters, seed: u32) -> Skeleton {
     let mut random = Random::new(seed, 0);
     let scale = parameters.scale[0] + random.around(parameters.scale[1]);
-    let level = &parameters.levels[0];
-    let length = (level.length[0] + random.around(level.length[1])) * scale;
-    let mut grower = Grower { parameters, scale, random, skeleton: Skeleton::default() };
+    let [length, variation] = parameters.trunk.length;
+    let length = (length + random.around(variation)) * scale;
+    let (levels, skeleton) = (parameters.levels(), Skeleton::default());
+    let mut grower = Grower { parameters, levels, scale, random, skeleton };
     let base = Section { at: DVec3::ZERO, frame: DMat3::IDENTITY, radius: length * parameters.ratio };
     let trunk = grower.stem(0, base, length);
     grower.branch(&trunk, None);
@@ -65,6 +66,7 @@ pub(super) fn grow(parameters: &Parameters, seed: u32) -> Skeleton {
 
 struct Grower<'a> {
     parameters: &'a Parameters,
+    levels: [Level; 3],
     scale: f64,
     random: Random,
     skeleton: Skeleton,
@@ -77,7 +79,7 @@ impl Grower<'_> {
 
     /// Grows one stem from its base (section 4.1) and keeps it.
     fn stem(&mut self, index: usize, base: Section, length: f64) -> Stem {
-        let level = self.parameters.levels[index];
+        let level = self.levels[index];
         let step = length / f64::from(level.segments);
         let (mut at, mut frame) = (base.at, base.frame);
         let mut sections = Vec::with_capacity(level.segments as usize + 1);
@@ -95,7 +97,7 @@ impl Grower<'_> {
 
     /// Taper (section 4.4; `nTaper` up to 1 only) and, on the trunk, flare.
     fn radius(&self, index: usize, base: f64, along: f64) -> f64 {
-        let tapered = base * (1.0 - self.parameters.levels[index].taper * along);
+        let tapered = base * (1.0 - self.levels[index].taper * along);
         // A tip of no radius would leave triangles of no area.
         let radius = tapered.max(0.06 * base);
         if index > 0 {
@@ -123,18 +125,22 @@ impl Grower<'_> {
             let up = self.parameters.attraction_up * declination * turned.y_axis.z / n;
             turned *= DMat3::from_rotation_x(-up);
         }
-        turned
+        droop(turned, level.droop.to_radians() / n)
     }
 
     /// Grows the children of a stem (sections 4.2 and 4.3), or its leaves if it is a twig. `relative` is the stem's
     /// length over its parent's, over the largest there.
     fn branch(&mut self, parent: &Stem, relative: Option<f64>) {
         let index = parent.level + 1;
-        let Some(&level) = self.parameters.levels.get(index) else { return self.leaves(parent) };
+        let Some(&level) = self.levels.get(index) else { return self.leaves(parent) };
         let p = *self.parameters;
         // The longest stem carries `nBranches`, shorter ones fewer.
-        let count = (level.branches * relative.map_or(1.0, |r| 0.2 + 0.8 * r)).round().max(1.0) as u32;
-        let base = if parent.level == 0 { p.base_size * self.scale } else { 0.08 * parent.length };
+        let count = (level.count * relative.map_or(1.0, |r| 0.2 + 0.8 * r)).round().max(1.0) as u32;
+        let base = if parent.level == 0 {
+            p.base_size * self.scale
+        } else {
+            self.levels[parent.level].bare * parent.length
+        };
         let mut turn = self.random.unit() * 360.0;
         for i in 0..count {
             let jitter = self.random.unit();
@@ -168,13 +174,16 @@ impl Grower<'_> {
         }
     }
 
-    /// Sprays along a twig, the last one at its tip (section 4.6, with `Leaves` the same for every twig).
+    /// Sprays along a twig beyond its bare part, the last one at its tip (section 4.6, with `Leaves` the same for every
+    /// twig).
     fn leaves(&mut self, twig: &Stem) {
-        let leaves = self.parameters.leaves;
+        let Some(leaves) = self.parameters.leaves else { return };
+        let bare = self.levels[twig.level].bare * twig.length;
         let count = leaves.count as u32;
         let mut turn = self.random.unit() * 360.0;
         for i in 0..count {
-            let offset = twig.length * (f64::from(i) + 0.5 + self.random.around(0.3)) / f64::from(count);
+            let offset = bare
+                + (twig.length - bare) * (f64::from(i) + 0.5 + self.random.around(0.3)) / f64::from(count);
             turn = self.turn(turn, leaves.rotate, i);
             let down = self.varied(leaves.down_angle);
             let start = at(twig, offset);
@@ -191,6 +200,16 @@ impl Grower<'_> {
 
 fn turned(frame: DMat3, about_z: f64, about_x: f64) -> DMat3 {
     frame * DMat3::from_rotation_z(about_z.to_radians()) * DMat3::from_rotation_x(about_x.to_radians())
+}
+
+/// Turns a frame towards the ground by an angle, but not beyond straight down; by a negative one towards the sky.
+fn droop(frame: DMat3, angle: f64) -> DMat3 {
+    let towards = if angle > 0.0 { DVec3::NEG_Z } else { DVec3::Z };
+    let left = frame.z_axis.dot(towards).clamp(-1.0, 1.0).acos();
+    match frame.z_axis.cross(towards).try_normalize() {
+        Some(axis) if angle != 0.0 => DMat3::from_axis_angle(axis, angle.abs().min(left)) * frame,
+        _ => frame,
+    }
 }
 
 /// The cross-section of a stem at a distance from its base.

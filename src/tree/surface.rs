@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::parameters::Parameters;
+use super::parameters::{Leaves, Parameters};
 use super::skeleton::{Skeleton, Stem};
 
 /// A surface of one material: z up, metres.
@@ -30,19 +30,18 @@ impl Surface {
 /// The bark: each stem a tapered generalized cylinder with shared vertices and smooth normals.
 pub(super) fn bark(parameters: &Parameters, skeleton: &Skeleton) -> Surface {
     let mut surface = Surface::default();
+    let levels = parameters.levels();
     for stem in &skeleton.stems {
-        cylinder(&mut surface, parameters, stem);
+        cylinder(&mut surface, levels[stem.level].sides, parameters.bark.repeat, stem);
     }
     surface
 }
 
-fn cylinder(surface: &mut Surface, parameters: &Parameters, stem: &Stem) {
-    let sides = parameters.levels[stem.level].sides;
+fn cylinder(surface: &mut Surface, sides: u32, repeat: f64, stem: &Stem) {
     let last = stem.sections.len() - 1;
     let step = stem.length / last as f64;
     // A whole number of repeats around, so that the texture meets itself.
-    let around =
-        (std::f64::consts::TAU * stem.sections[0].radius / (0.5 * parameters.bark_repeat)).round().max(1.0);
+    let around = (std::f64::consts::TAU * stem.sections[0].radius / (0.5 * repeat)).round().max(1.0);
     let first = surface.positions.len() as u32;
     for (i, section) in stem.sections.iter().enumerate() {
         // The ring stands across the mean of the segments that meet there, or it would be pinched.
@@ -55,7 +54,7 @@ fn cylinder(surface: &mut Surface, parameters: &Parameters, stem: &Stem) {
         for k in 0..=sides {
             let angle = f64::from(k % sides) * std::f64::consts::TAU / f64::from(sides);
             let out = x * angle.cos() + y * angle.sin();
-            let uv = [around * f64::from(k) / f64::from(sides), -(i as f64) * step / parameters.bark_repeat];
+            let uv = [around * f64::from(k) / f64::from(sides), -(i as f64) * step / repeat];
             surface.vertex(section.at + out * section.radius, out + axis * slope, uv);
         }
     }
@@ -68,15 +67,14 @@ fn cylinder(surface: &mut Surface, parameters: &Parameters, stem: &Stem) {
     }
 }
 
-/// The leaves: each spray two cards, crossed along its axis.
-pub(super) fn leaves(parameters: &Parameters, skeleton: &Skeleton) -> Surface {
+/// The leaves: each spray a card, or two crossed along its axis.
+pub(super) fn leaves(leaves: &Leaves, skeleton: &Skeleton) -> Surface {
     let mut surface = Surface::default();
     for spray in &skeleton.sprays {
-        let length = parameters.leaves.length * spray.scale;
-        let (along, half) = (spray.frame.z_axis * length, 0.5 * parameters.leaves.width * length);
-        for (side, normal) in
-            [(spray.frame.x_axis, spray.frame.y_axis), (spray.frame.y_axis, -spray.frame.x_axis)]
-        {
+        let length = leaves.length * spray.scale;
+        let (along, half) = (spray.frame.z_axis * length, 0.5 * leaves.width * length);
+        let crossed = [(spray.frame.x_axis, spray.frame.y_axis), (spray.frame.y_axis, -spray.frame.x_axis)];
+        for (side, normal) in crossed.into_iter().take(leaves.cards as usize) {
             let (left, right) = (spray.at - side * half, spray.at + side * half);
             let a = surface.vertex(left, -normal, [0.0, 1.0]);
             let b = surface.vertex(right, -normal, [1.0, 1.0]);
