@@ -11,7 +11,7 @@ use crate::settings::nearest;
 use crate::{Error, Result};
 
 /// A text and its name, to turn byte offsets into lines.
-pub(super) struct Source<'a> {
+pub(crate) struct Source<'a> {
     /// The file as the user named it.
     pub path: &'a Path,
     /// Its whole text.
@@ -33,7 +33,7 @@ impl Source<'_> {
 
 /// A value at a key.
 #[derive(Clone)]
-pub(super) struct Item<'a> {
+pub(crate) struct Item<'a> {
     source: &'a Source<'a>,
     key: String,
     offset: usize,
@@ -42,7 +42,7 @@ pub(super) struct Item<'a> {
 
 /// A table whose keys are all known.
 #[derive(Clone)]
-pub(super) struct Table<'a> {
+pub(crate) struct Table<'a> {
     source: &'a Source<'a>,
     key: String,
     offset: usize,

@@ -79,6 +79,8 @@ pub mod forest;
 pub mod frame;
 pub mod gpu;
 pub mod image;
+mod input;
+mod keys;
 pub mod ladder;
 pub mod land;
 pub mod measure;

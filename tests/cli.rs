@@ -97,6 +97,10 @@ fn wrong_usage_is_2_and_says_what_to_do() {
         (&["bake", "/nonexistent.glb"], "/nonexistent.glb"),
         (&["bake", "builtin:oak", "--height", "0"], "0.01 to 1000"),
         (&["tree", "elm"], "birch"),
+        (&["tree", "oka"], "\"oak\""),
+        (&["tree", "oak", "--set", "bas_size=0.4"], "`base_size`?"),
+        (&["tree", "oak", "--set", "base_size=4"], "0 to 0.95"),
+        (&["tree", "/nonexistent/elm.toml"], "/nonexistent/elm.toml"),
         (&["tree", "oak", "-o", "/nonexistent/oak.glb"], "no folder /nonexistent"),
     ] {
         let text = refused(2, args);

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Parts of the library from the top down: each uses only what stands below it. A scene says which ladder it wants, so that is below it.
-const STOREYS: [&[&str]; 15] = [
+const STOREYS: [&[&str]; 16] = [
     &["measure"],
     &["reference"],
     &["frame"],
@@ -17,7 +17,8 @@ const STOREYS: [&[&str]; 15] = [
     &["scene"],
     &["tree"],
     &["ladder"],
-    &["image", "files", "settings"],
+    &["keys"],
+    &["image", "files", "input", "settings"],
     &["gpu"],
     &["rays", "progress", "clock"],
     &["physics", "error"],

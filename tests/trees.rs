@@ -1,13 +1,14 @@
 //! The procedural species: valid, repeatable, varied, and of the right size.
 
 use std::path::Path;
+use std::process::Command;
 
 use canopy::scene::Mesh;
-use canopy::scene::model::load_model_bytes;
-use canopy::tree::{self, Preset};
+use canopy::scene::model::{load_model, load_model_bytes};
+use canopy::tree::Preset;
 
 fn load(preset: Preset, seed: u32) -> Mesh {
-    load_model_bytes(Path::new(preset.name()), &tree::glb(preset, seed), None, None).unwrap()
+    load_model_bytes(Path::new(preset.name()), &canopy::tree::glb(preset, seed), None, None).unwrap()
 }
 
 fn top(mesh: &Mesh) -> f32 {
@@ -17,9 +18,9 @@ fn top(mesh: &Mesh) -> f32 {
 #[test]
 fn seeds_decide_everything() {
     for preset in Preset::ALL {
-        let bytes = tree::glb(preset, 1);
-        assert!(bytes == tree::glb(preset, 1), "{preset:?} differs from itself");
-        assert!(bytes != tree::glb(preset, 2), "{preset:?} ignores its seed");
+        let bytes = canopy::tree::glb(preset, 1);
+        assert!(bytes == canopy::tree::glb(preset, 1), "{preset:?} differs from itself");
+        assert!(bytes != canopy::tree::glb(preset, 2), "{preset:?} ignores its seed");
     }
 }
 
@@ -110,4 +111,28 @@ fn bark_faces_outward() {
             assert!((b - a).cross(c - a).dot(smooth) > 0.0, "{preset:?}: {a} {b} {c}");
         }
     }
+}
+
+/// Runs `canopy tree` in a folder and returns what it printed.
+fn tree(folder: &Path, args: &[&str]) -> String {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_canopy"));
+    let out = program.current_dir(folder).arg("tree").args(args).output().unwrap();
+    assert!(out.status.success(), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
+    String::from_utf8(out.stdout).unwrap()
+}
+
+#[test]
+fn a_species_of_ones_own_is_printed_changed_and_grown() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    let text = tree(folder.path(), &["birch", "--print"]);
+    assert_eq!(text, Preset::Birch.text());
+    std::fs::write(folder.path().join("elm.toml"), text).unwrap();
+    tree(folder.path(), &["elm.toml", "--seed", "4"]);
+    assert!(file("elm.glb") == canopy::tree::glb(Preset::Birch, 4), "the same numbers are the same tree");
+    tree(folder.path(), &["elm.toml", "--seed", "4", "--set", "scale=20", "-o", "tall.glb"]);
+    let heights = ["elm.glb", "tall.glb"].map(|f| top(&load_model(&folder.path().join(f), None).unwrap()));
+    assert!(heights[1] > 1.4 * heights[0], "{heights:?}");
+    let bare = tree(folder.path(), &["birch", "--set", "base_size=0.3", "--print"]);
+    assert!(bare.contains("\nbase_size = 0.3\n"), "{bare}");
 }

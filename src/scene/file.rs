@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 
 use toml::de::DeTable;
 
-use super::input::read_text;
-use super::keys::{Item, Source, Table};
 use super::{Camera, Scene, Sky, Sun, texture};
+use crate::input::read_text;
+use crate::keys::{Item, Source, Table};
 use crate::ladder::{Ladder, LadderError};
 use crate::settings::{KNOBS, PRESETS, Settings, nearest};
 use crate::{Error, Result};

@@ -4,8 +4,6 @@
 //! World axes: x east, y north, z up, metres, relative to the south-west corner of the terrain.
 
 mod file;
-mod input;
-mod keys;
 pub mod mesh;
 pub mod model;
 pub mod positions;

@@ -16,8 +16,8 @@ use gltf::mesh::Mode;
 
 use self::buffers::Buffers;
 use self::materials::Materials;
-use super::input::read_bytes;
 use super::mesh::{Mesh, Triangle};
+use crate::input::read_bytes;
 use crate::{Error, Result, tree};
 
 /// Most vertices, and most triangles, of a model.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::TreePosition;
-use super::input::read_bytes;
+use crate::input::read_bytes;
 use crate::settings::nearest;
 use crate::{Error, Result};
 

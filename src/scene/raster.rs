@@ -9,7 +9,7 @@ use image::ImageDecoder;
 use tiff::decoder::DecodingResult;
 use tiff::tags::Tag;
 
-use super::input::{check_content, read_bytes};
+use crate::input::{check_content, read_bytes};
 use crate::physics::raster::Raster;
 use crate::{Error, Result};
 

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use image::{ImageDecoder, ImageFormat, ImageReader};
 
-use super::input::{check_content, decoded, read_bytes};
 use super::{Sky, Texture};
+use crate::input::{check_content, decoded, read_bytes};
 use crate::{Error, Result};
 
 /// Most texels along a side of a texture or sky.

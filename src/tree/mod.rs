@@ -1,21 +1,26 @@
 //! Procedural species, written as glTF and read back as glTF.
 //!
 //! The model is that of Weber and Penn, "Creation and Rendering of Realistic Trees" (SIGGRAPH 1995): stems in three
-//! levels, each described by a table of numbers (`parameters`; `species/*.toml`), grown into a skeleton (`skeleton`),
+//! levels, each described by a table of numbers (`parameters`; `keys`; `species/*.toml`), grown into a skeleton (`skeleton`),
 //! covered with tapered cylinders and leaf cards (`surface`), and dressed in two made textures (`bark`, `cards`). A
 //! species and a seed give the same bytes every time.
 
 mod bark;
 mod cards;
 mod export;
+mod keys;
+mod limits;
 mod parameters;
 mod random;
 mod skeleton;
+mod species;
 mod surface;
 
 use std::str::FromStr;
 
 use self::parameters::Parameters;
+pub use keys::{KEYS, Key};
+pub use species::Species;
 
 /// Seed of built-in models: every scene shows the same individual, so that what is baked from it is shared.
 pub const BUILTIN_SEED: u32 = 1;

@@ -45,6 +45,18 @@ impl Shape {
     }
 }
 
+/// The words for [`Shape`].
+pub(super) const SHAPES: [&str; 8] = [
+    "conical",
+    "spire",
+    "spherical",
+    "hemispherical",
+    "cylindrical",
+    "tapered-cylindrical",
+    "inverse-conical",
+    "tend-flame",
+];
+
 /// A number and its variation, `n ± nV`.
 pub(super) type Varied = [f64; 2];
 
@@ -124,6 +136,9 @@ pub(super) enum Blade {
     Needles,
 }
 
+/// The words for [`Blade`].
+pub(super) const BLADES: [&str; 5] = ["lobed", "ovate", "heart", "lance", "needles"];
+
 /// The leaf cards, each showing a spray.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -166,6 +181,9 @@ pub(super) enum Relief {
     /// Even, as a birch's.
     Smooth,
 }
+
+/// The words for [`Relief`].
+pub(super) const RELIEFS: [&str; 3] = ["fissured", "plated", "smooth"];
 
 /// The bark's texture.
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -239,19 +257,19 @@ impl Parameters {
 mod tests {
     use super::*;
 
+    /// The words of a list as values of a type.
+    fn words<T: serde::de::DeserializeOwned>(words: &[&str]) -> Vec<T> {
+        words.iter().map(|w| toml::Value::from(*w).try_into().unwrap()).collect()
+    }
+
+    #[test]
+    fn every_word_is_understood() {
+        assert_eq!(words::<Blade>(&BLADES).len() + words::<Relief>(&RELIEFS).len(), 8);
+    }
+
     #[test]
     fn shape_ratios_are_continuous_and_positive() {
-        use Shape::*;
-        for shape in [
-            Conical,
-            Spire,
-            Spherical,
-            Hemispherical,
-            Cylindrical,
-            TaperedCylindrical,
-            InverseConical,
-            TendFlame,
-        ] {
+        for shape in words::<Shape>(&SHAPES) {
             for i in 0..1000 {
                 let (a, b) = (f64::from(i) / 1000.0, f64::from(i + 1) / 1000.0);
                 assert!(

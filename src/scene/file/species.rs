@@ -4,11 +4,11 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::super::keys::{Item, Table};
 use super::super::model::{load_model, load_model_bytes, scale_to_height};
 use super::super::{Distribution, Mesh, OpticsOverride, Species, Terrain, positions, raster};
 use super::{existing, unique};
 use crate::Result;
+use crate::keys::{Item, Table};
 use crate::settings::nearest;
 use crate::tree::{self, BUILTIN_SEED, Preset};
 

@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::super::keys::{Item, Table};
 use super::super::{Albedo, Terrain, raster, ridge, texture};
 use super::{MAX_METRES, existing};
 use crate::Result;
+use crate::keys::{Item, Table};
 use crate::physics::raster::Raster;
 
 /// The heightmap that needs no file.

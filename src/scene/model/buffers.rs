@@ -7,7 +7,7 @@ use gltf::json;
 use percent_encoding::percent_decode_str;
 
 use super::MAX_BYTES;
-use crate::scene::input::read_bytes;
+use crate::input::read_bytes;
 use crate::{Error, Result};
 
 /// The bytes of every buffer, each exactly as long as the file says.
