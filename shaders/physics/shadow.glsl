@@ -7,9 +7,10 @@ vec2 plane_gradient(vec3 n, vec3 x, vec3 y, vec3 sun) {
 }
 
 // The cascade for a distance, given how far each of `count` is used: MAX_CASCADES beyond the last, and without any.
+// The loop's end is no uniform: lavapipe 22.3.6 unrolls a loop that ends at one, and so compiles the shader anew in every frame.
 uint cascade_at(vec4 far, uint count, float distance) {
     uint nearer = 0u;
-    for (uint k = 0u; k < count; k++) nearer += distance > far[k] ? 1u : 0u;
+    for (uint k = 0u; k < MAX_CASCADES; k++) nearer += k < count && distance > far[k] ? 1u : 0u;
     return nearer < count ? nearer : MAX_CASCADES;
 }
 
