@@ -91,6 +91,8 @@ struct Species {
     float turning;                    // change of the reflectance with the phase angle, 1/rad
     vec2 sky;                         // factor of the sky's light on a crown from the side, and its change with the cosine of the view's zenith angle
     float hole;                       // 1 / squared radius of the hole around a tree, over the density: BN12 eq. 9
+    vec4 lit[4];                      // correction of the share of a crown that is lit: two at the middle of the tree, two of their change
+    vec4 sent[4];                     // correction of the sunlight that it sends
 };
 
 // Rows of the projection of scaled tree space into one z-field view.
@@ -165,14 +167,14 @@ struct Tree {
     vec2 light_weights;               // of the first two light views
     float mip;                        // of the views
     float fade;                       // factor of the opacity
-    vec3 sun;                         // radiance of a lit leaf: phase function, hotspot and irradiance
-    float hole;                       // 1 / squared radius of the hole around it, 1/m2
+    vec3 sun;                         // radiance of a lit leaf at height 0: phase function, hotspot, irradiance and correction
+    uint hole_change;                 // halves: 1 / squared radius of the hole around it, 1/m2; change of `sun` with the height, over it
     vec3 sky;                         // radiance of a leaf under the whole sky
     uint cascade;                     // for its shadow lookups
     vec3 mean_sun;                    // average radiance from the sun, times nu of BN12 eq. 22
-    float own;                        // 1 - nu: weight of the tree's own light
+    uint own_lit;                     // halves: 1 - nu, weight of the tree's own light; correction of its lit share at height 0
     vec3 mean_sky;                    // average radiance from the sky, times nu
-    float mean_lit;                   // average k_t / (k_t + k_t-bar), times nu
+    uint mean_lit_change;             // halves: average k_t / (k_t + k_t-bar), times nu; change of that correction with the height
 };
 
 // What of a cascade lies between two seams of its map, and how the world is drawn there. Its coordinates are world-fixed: x and
@@ -209,7 +211,7 @@ struct Caster {
     uint light_layers;                // three z-field views nearest the light direction, 10 bits each
     vec2 light_weights;               // of the first two views
     float mip;                        // of the views
-    uint dither;                      // hash
+    uint dither;                      // hash; its last 8 bits: the tree's name in the map
 };
 
 // What finding casters takes.

@@ -48,7 +48,7 @@ Caster make_caster(ShadowBlock b, Seed s, vec3 place, Species kind) {
     t.light_weights = weights.xy;
     float width = 2.0 * max(kind.scale_to_metres.x, kind.scale_to_metres.z) * s.scale;
     t.mip = clamp(floor(log2(VIEW_RESOLUTION / (width * b.texels_per_metre)) + 0.5), 0.0, log2(VIEW_RESOLUTION));
-    t.dither = hash(s.identity ^ HASH_DITHER ^ b.cascade);
+    t.dither = (hash(s.identity ^ HASH_DITHER ^ b.cascade) & ~255u) | caster_name(s.identity);
     return t;
 }
 

@@ -6,6 +6,8 @@
 #include "physics/hash.glsl"
 #include "physics/views.glsl"
 #include "physics/light.glsl"
+#include "physics/correction.glsl"
+#include "physics/transfer.glsl"
 #include "physics/tables.glsl"
 #include "physics/handover.glsl"
 #include "physics/shadow.glsl"
@@ -49,17 +51,17 @@ uint lookup(vec3 w, out vec2 weights) {
     return layers.x | layers.y << 10u | layers.z << 20u | (below ? 1u << 31u : 0u);
 }
 
-// The light of the average tree around this one, towards which its own converges with nu (BN12, eq. 22 and 23).
-void average_light(inout Tree t, Species kind, vec3 to_camera, vec3 ground, float density, float nu) {
+// The light of the average tree around this one, towards which its own converges with nu (BN12, eq. 22 and 23); returns what of it is
+// lit.
+float average_light(inout Tree t, Species kind, vec3 to_camera, vec3 ground, float density, float nu) {
     float x = density * kind.mean_area;
     TableForest f = table_forest(pair_table, view_table, to_camera, view.v.sun_direction, ground, kind.vertical_scale, x,
                                  min(x, kind.max_thickness), kind.max_thickness, float(t.species), TABLE_ANGLES,
                                  TABLE_DENSITIES, PAIR_TABLES);
     float lit = nu * sun_facing(view.v.sun_direction, ground);
-    t.own = 1.0 - nu;
     t.mean_sun = (lit * f.transfer) * t.sun * (f.sun.x + f.sun.y * kind.bark_ratio);
-    t.mean_lit = lit * (f.sun.x + f.sun.y);
     t.mean_sky = nu * t.sky * (f.sky.x + f.sky.y * kind.bark_ratio);
+    return lit * (f.sun.x + f.sun.y);
 }
 
 // Opacity factor of a tree: faded out at its range, or on a silhouette, at the farther one.
@@ -102,13 +104,20 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     float density = unpackHalf2x16(s.species_density).y;
     density *= density;
     float tint = 1.0 + 0.3 * (float(s.turn_tint >> 16u) / 65535.0 - 0.5);
-    vec3 lit = turned_reflectance(kind.reflectance, kind.turning, angle_between(to_camera, v.sun_direction));
-    vec3 phase = leaf_phase(to_camera, v.sun_direction, lit, kind.transmittance);
+    float phase_angle = angle_between(to_camera, v.sun_direction);
+    vec3 phase = leaf_phase(to_camera, v.sun_direction, turned_reflectance(kind.reflectance, kind.turning, phase_angle), kind.transmittance);
     t.sun = tint * phase * hotspot(to_camera, v.sun_direction, v.hotspot_amplitude, v.hotspot_width) * v.sun_irradiance;
     // rho / 2 of a leaf that the upper hemisphere lights, times the visibility of the sky above a slope (BN12, eq. 9).
     t.sky = tint * kind.albedo * (0.25 * (1.0 + ground.z)) * v.sky_radiance;
-    t.hole = density * kind.hole;
-    average_light(t, kind, to_camera, ground, density, converged(relative, v.convergence));
+    float nu = converged(relative, v.convergence), mean_lit = average_light(t, kind, to_camera, ground, density, nu);
+    // The tables' average has it already.
+    CorrectionTerms y = correction_terms(to_camera.z, v.sun_direction.z, phase_angle);
+    vec2 lit = correction_line(kind.lit, y, transfer_strength(sqrt(phase_angle))), sent = correction_line(kind.sent, y, 1.0);
+    float middle = max(sent.x, 0.05);
+    t.sun *= middle;
+    t.hole_change = packHalf2x16(vec2(density * kind.hole, sent.y / middle));
+    t.own_lit = packHalf2x16(vec2(1.0 - nu, lit.x));
+    t.mean_lit_change = packHalf2x16(vec2(mean_lit, lit.y));
     // From above more of the leaves' upper sides is seen, which the sky lights. The tables' average knows.
     t.sky *= max(kind.sky.x + kind.sky.y * to_camera.z, 0.0);
     t.cascade = cascade_at(v.cascade_far, v.cascade_count, distance);

@@ -43,7 +43,7 @@ float shadow_maps(vec3 position, vec3 n, float cosine, float distance) {
     vec3 from = position + n * (texel * sqrt(1.0 - cosine * cosine)) + view.v.sun_direction * (0.5 * texel);
     vec2 gradient = plane_gradient(n, view.v.cascade_x, view.v.cascade_y, view.v.sun_direction);
     vec3 at = (view.v.cascade_from_world[c] * vec4(from, 1.0)).xyz;
-    return sun_visibility(shadow_map, at, gradient, view.v.cascade_turn[c].xy, c);
+    return sun_visibility(shadow_map, at, gradient, view.v.cascade_turn[c].xy, c, NO_TREE, 0.0);
 }
 
 // Unit normal of the ground.

@@ -21,3 +21,6 @@ const uint HASH_DITHER = 0x7feb352du;
 const uint HASH_FADE = 0x846ca68bu;
 const uint HASH_THIN = 0x68e31da4u;
 const uint HASH_SPECIES = 0xb5297a4du;
+
+// Name of a tree in the shadow maps, of 8 bits.
+uint caster_name(uint identity) { return hash(identity ^ HASH_DITHER) & 255u; }

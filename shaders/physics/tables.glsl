@@ -2,7 +2,7 @@
 // parametrisation is derived. Entries are ratios that stay smooth and bounded where G itself does not:
 //   G = exp(-x (sec tv + sec tl) W)    lit and visible ground, x = lambda A
 //   P = exp(-x sec tv V)               visible ground
-// W, V, T, E and the rest are in textures, linear between the nodes.
+// W, V, S = T / lit_of_seen, E and the rest are in textures, linear between the nodes.
 
 const float TABLE_MAX_ANGLE = 1.5358897417550099; // 88 degrees
 
@@ -38,13 +38,19 @@ TableAngles table_angles(vec3 v, vec3 l, vec3 n, float k) {
 // Coordinate of a viewer's zenith angle in [0, n - 1].
 float table_zenith(float v, float n) { return (n - 1.0) * (clamp(v, 0.0, TABLE_MAX_ANGLE) / TABLE_MAX_ANGLE); }
 
+// t of a node whose angle is t2 (3 - t2) / 2 of the room away from the ridge; written so that nothing cancels near it.
+float off_ridge_inverse(float part) {
+    float s = clamp(part, 0.0, 1.0);
+    return sqrt(2.0 * s / (1.5 + sqrt(2.25 - 2.0 * s)));
+}
+
 // Grid coordinates, in [0, n - 1], of the azimuth, the light's zenith angle and the viewer's. The second axis counts from
 // the viewer's angle on, finely near it, so that the hotspot's ridge v = l is a line of the grid.
 vec3 table_coordinates(TableAngles a, float n) {
     float v = clamp(a.v, 0.0, TABLE_MAX_ANGLE), l = clamp(a.l, 0.0, TABLE_MAX_ANGLE), d = l - v;
     float middle = floor(0.5 * (n - 1.0));
-    float below = middle * (1.0 - sqrt(clamp(-d / max(v, 1e-6), 0.0, 1.0)));
-    float above = middle + (n - 1.0 - middle) * sqrt(clamp(d / max(TABLE_MAX_ANGLE - v, 1e-6), 0.0, 1.0));
+    float below = middle * (1.0 - off_ridge_inverse(-d / max(v, 1e-6)));
+    float above = middle + (n - 1.0 - middle) * off_ridge_inverse(d / max(TABLE_MAX_ANGLE - v, 1e-6));
     return vec3((n - 1.0) * sqrt(clamp(a.phi * (1.0 / 3.141592653589793), 0.0, 1.0)), d > 0.0 ? above : below,
                 table_zenith(a.v, n));
 }
@@ -52,7 +58,7 @@ vec3 table_coordinates(TableAngles a, float n) {
 // Coordinate of an optical thickness x = lambda A in [0, m - 1].
 float table_density(float x, float x_max, float m) { return (m - 1.0) * sqrt(clamp(x / max(x_max, 1e-9), 0.0, 1.0)); }
 
-// (W, T of leaves, T of bark, light transfer): trilinear in the angles, linear between two densities.
+// (W, S of leaves, S of bark, light transfer), T = S lit_of_seen: trilinear in the angles, linear between two densities.
 vec4 table_pair(sampler3D pairs, vec3 at, float density, float species, float n, float m) {
     float j = clamp(floor(density), 0.0, max(m - 2.0, 0.0));
     vec3 size = vec3(textureSize(pairs, 0));
@@ -86,10 +92,12 @@ struct TableForest {
 // Mean of exp(-x t) over t in [0, 1].
 float mean_through(float x) { return x < 1e-2 ? 1.0 - x * (0.5 - x / 6.0) : (1.0 - exp(-x)) / x; }
 
+// What is lit of an even layer among what is seen of it, of the optical paths of the view and of view and light together.
+float lit_of_seen(float seen, float joint) { return mean_through(joint) / mean_through(seen); }
+
 // Along v of trees of optical thickness x (density times area) on a slope of unit normal n. The tables are of level ground,
 // which a shear makes of the slope. It leaves how trees stand to each other, and changes crowns: what one crown by itself is
-// to v and l, at density 0, is put in place of what the shear makes of it, and where that lets less light through, or more,
-// so do the crowns before it. Nothing changes on level ground. `known` is the thickness of the species' own forest that is looked up:
+// to v and l, at density 0, is put in place of what the shear makes of it, and so do the paths through the crowns before it. Nothing changes on level ground. `known` is the thickness of the species' own forest that is looked up:
 // x where it stands alone, at most that where larger trees stand with it, which take more of the light than its own would.
 TableForest table_forest(sampler3D pairs, sampler2DArray views, vec3 v, vec3 l, vec3 n, float k, float x, float known,
                          float x_max, float species, float count, float m, bool lit) {
@@ -113,10 +121,7 @@ TableForest table_forest(sampler3D pairs, sampler2DArray views, vec3 v, vec3 l, 
         vec4 p = table_pair(pairs, at_s, at_x, species, count, m);
         vec4 ps = table_pair(pairs, at_s, 0.0, species, count, m), pu = table_pair(pairs, at_u, 0.0, species, count, m);
         f.joint = max(x * (s.sec_v * view_path + s.sec_l * light_path) * p.x, f.seen);
-        // Of the sheared crowns, and of the species alone.
-        float seen = known * s.sec_v * t.x, joint = max(known * (s.sec_v + s.sec_l) * p.x, seen);
-        float layer = (mean_through(f.joint) * mean_through(seen)) / (mean_through(joint) * mean_through(f.seen));
-        float change = layer * (pu.y + pu.z) / max(ps.y + ps.z, 1e-3);
+        float change = lit_of_seen(f.seen, f.joint) * (pu.y + pu.z) / max(ps.y + ps.z, 1e-3);
         f.sun = p.yz * min(change, 1.0 / max(p.y + p.z, 1e-6));
         f.transfer = p.w * (pu.w / max(ps.w, 1e-3));
     }

@@ -12,6 +12,7 @@ use super::{
     BakeSettings, ForestSettings, SpeciesBake, Turned, bake_transfer, bake_views, check, load_or_measure,
 };
 use crate::Result;
+use crate::physics::correction::{Correction, TERMS};
 use crate::physics::crown::{Crown, Frame};
 use crate::physics::tables::ForestTables;
 use crate::physics::transfer::Transfer;
@@ -19,10 +20,10 @@ use crate::physics::views;
 use crate::physics::zfield::ZField;
 use crate::scene::{Mesh, OpticsOverride};
 
-const VIEWS: Format = Format { magic: *b"CANOPYZF", version: 13, extension: "zfield" };
-const TRANSFER: Format = Format { magic: *b"CANOPYLT", version: 1, extension: "transfer" };
+const VIEWS: Format = Format { magic: *b"CANOPYZF", version: 14, extension: "zfield" };
+const TRANSFER: Format = Format { magic: *b"CANOPYLT", version: 4, extension: "transfer" };
 /// Numbers at the head of a file of views.
-const SCALARS: usize = 23;
+const SCALARS: usize = 23 + 4 * TERMS;
 
 /// Where a bake came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,9 +119,19 @@ impl<'a> Source<'a> {
         let band: Vec<usize> = level_sizes(self.settings.rings, resolution).collect();
         let (transfer, state) = load_or_build(
             (self.dir, &TRANSFER, key),
-            &band.repeat(bands as usize),
-            |parts| Transfer { resolution, bands: parts.chunks(band.len()).map(<[_]>::to_vec).collect() },
-            |transfer, put| transfer.bands.iter().flatten().try_for_each(|l| put(l)),
+            &[&[8 * TERMS][..], &band.repeat(bands as usize)].concat(),
+            |parts| {
+                let sent: Vec<f32> =
+                    parts[0].as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+                let of = |first: usize| std::array::from_fn(|i| sent[first + i]);
+                let bands = parts[1..].chunks(band.len()).map(<[_]>::to_vec).collect();
+                Transfer { resolution, bands, sent: Correction { middle: of(0), change: of(TERMS) } }
+            },
+            |transfer, put| {
+                let Correction { middle, change } = transfer.sent;
+                put(&[middle, change].map(|c| c.map(f32::to_le_bytes).concat()).concat())?;
+                transfer.bands.iter().flatten().try_for_each(|l| put(l))
+            },
             || bake_transfer(self.mesh, bake, bands, self.quiet),
             self.quiet,
         )?;
@@ -215,6 +226,8 @@ fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
         height,
         leaf_shadow,
         extinction,
+        lit,
+        sent,
     } = b.crown;
     let Turned { reflected, slope, passed, bark_reflected, bark_share } = b.turned;
     #[rustfmt::skip]
@@ -222,7 +235,10 @@ fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
         centre, half_width, half_height, reflected, slope, passed, bark_reflected, bark_share, leaf_shadow, extinction,
         r0, r1, r2, t0, t1, t2, b0, b1, b2, b.area, radius, base, height,
     ];
-    all
+    let corrections = [lit.middle, lit.change, sent.middle, sent.change];
+    let mut scalars = [0.0; SCALARS];
+    scalars.iter_mut().zip(all.iter().chain(corrections.iter().flatten())).for_each(|(to, from)| *to = *from);
+    scalars
 }
 
 /// Bytes of every mip level of `rings` rings of views of `resolution`² texels.
@@ -240,13 +256,15 @@ fn decode(mut parts: Vec<Vec<u8>>, settings: &BakeSettings) -> SpeciesBake {
     #[rustfmt::skip]
     let [
         centre, half_width, half_height, reflected, slope, passed, bark_reflected, bark_share, leaf_shadow, extinction,
-        r0, r1, r2, t0, t1, t2, b0, b1, b2, area, radius, base, height,
+        r0, r1, r2, t0, t1, t2, b0, b1, b2, area, radius, base, height, ..
     ] = x;
+    let of = |k: usize| std::array::from_fn(|i| x[SCALARS - 4 * TERMS + k * TERMS + i]);
+    let [lit, sent] = [0, 2].map(|k| Correction { middle: of(k), change: of(k + 1) });
     let frame = Frame { centre, half_width, half_height };
     SpeciesBake {
         views: ZField { n: settings.rings, resolution: settings.resolution, levels },
         transfer: Transfer::default(),
-        crown: Crown { frame, radius, base, height, leaf_shadow, extinction },
+        crown: Crown { frame, radius, base, height, leaf_shadow, extinction, lit, sent },
         turned: Turned { reflected, slope, passed, bark_reflected, bark_share },
         reflectance: [r0, r1, r2],
         transmittance: [t0, t1, t2],

@@ -1,8 +1,10 @@
 //! Species to data: z-field views, occlusion, optics; cached on disk by content.
 
 pub mod cache;
+mod correction;
 #[doc(hidden)]
 pub mod file;
+mod least_squares;
 mod occlusion;
 pub(crate) mod optics;
 mod raster;
@@ -20,6 +22,7 @@ pub use self_shadow::{LitCell, lit_cells};
 pub use tables::{ForestSettings, load_or_measure};
 pub use verify::{QualityReport, ViewQuality, demand, verify};
 
+use crate::physics::correction::Correction;
 use crate::physics::crown::Crown;
 use crate::physics::transfer::Transfer;
 use crate::physics::zfield::ZField;
@@ -83,6 +86,11 @@ impl SpeciesBake {
             k.reflected * self.reflectance[i] + k.bark_reflected * self.bark_reflectance[i]
         });
         [reflectance, self.transmittance.map(|x| k.passed * x)]
+    }
+
+    /// What is left out of the sunlight that is sent to the viewer: by the crown's laws, and by light transfer where there is any.
+    pub fn sent(&self) -> Correction {
+        if self.transfer.bands.is_empty() { self.crown.sent } else { self.transfer.sent }
     }
 
     /// Share of the sky's light that the crown's visible surface scatters, leaves and bark, linear RGB.

@@ -14,6 +14,7 @@ use glam::{Vec2, Vec3};
 use super::surface::Surface;
 use super::{SpeciesBake, self_shadow};
 use crate::physics::crown::Crown;
+use crate::physics::light::luminance;
 use crate::physics::tonemap::linear as linear_from_srgb;
 use crate::physics::transfer::Transfer;
 use crate::physics::views;
@@ -167,10 +168,12 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
     let frame = surface.frame;
     // A tree without foliage: all of it stands for leaves.
     let foliage: Vec<bool> = mesh.materials.iter().map(|m| m.foliage || !leaves.foliage).collect();
-    let matter = self_shadow::Matter { foliage: &foliage, base: leaves.base };
-    let self_shadow::Measured { shadow, turned } = self_shadow::measure(surface, &matter, &views);
-    let [leaf_shadow, extinction] = shadow.map(|x| x as f32);
     let colours = colours_of(&leaves, stated);
+    let luminances = [colours.reflectance, colours.transmittance, colours.bark_reflectance].map(luminance);
+    let matter = self_shadow::Matter { foliage: &foliage, base: leaves.base, luminances };
+    let self_shadow::Measured { shadow, turned, corrections: [lit, sent] } =
+        self_shadow::measure(surface, &matter, &views);
+    let [leaf_shadow, extinction] = shadow.map(|x| x as f32);
     let area = top_area(&views) * f64::from(frame.half_width).powi(2);
     SpeciesBake {
         views,
@@ -184,6 +187,8 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
                 + frame.centre,
             leaf_shadow,
             extinction: stated.extinction.unwrap_or(extinction),
+            lit,
+            sent,
         },
         turned,
         reflectance: colours.reflectance,

@@ -7,20 +7,33 @@
 //!
 //! min Σ w (exp(−√α (c + √(τ s))) − P)²,
 //!
-//! with w the opacity that the cell's view rays have together. Light is followed by one iteration, as the presets do: the first look
+//! with w the number of the cell's rays that meet the mesh. (Those that the mesh lets through are no part of it; their opacity is in
+//! this number already, and weighing by it again would count thin places, where more is lit, too little.) Light is followed by one iteration, as the presets do: the first look
 //! already tells near surfaces from far ones, and more iterations bring the point nearer to itself where it matters
 //! least (on an oak and a pine 0.027 and 0.028 are left with one iteration, 0.032 and 0.032 with two).
+//!
+//! What the law leaves out by the directions of viewer and sun and by height is measured last, from the same answers
+//! ([`crate::physics::correction`]): with P' and G what the law says of a ray's light and of the radiance that goes to the viewer, and
+//! t = 0 or 1 and T what the mesh does,
+//!
+//! min Σ (K P' − t)²/P' and min Σ (K G − T)²/G,
+//!
+//! weighed as counts are, whose variance is their mean.
 
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::correction::Fit;
 use super::surface::{Caster, Surface};
 use super::{SpeciesBake, Turned};
 use crate::Result;
+use crate::physics::correction::{self, Correction};
+use crate::physics::crown::{Crown, Frame};
 use crate::physics::hash::{Stream, hash2};
 use crate::physics::light;
+use crate::physics::transfer;
 use crate::physics::views::{self, Basis};
 use crate::physics::zfield::ZField;
 use crate::physics::zfield::{self, Ray};
@@ -28,7 +41,7 @@ use crate::rays::{Met, Stack};
 use crate::scene::Mesh;
 
 /// Pairs of rays: every cell that matters then has hundreds, and P of it a standard error of a few hundredths.
-const PAIRS: u32 = 131_072;
+const PAIRS: u32 = 262_144;
 /// Pairs a random stream; streams are the unit of work.
 const CHUNK: u32 = 512;
 /// Edges of the cells of the phase angle, degrees, and of the distance, in half heights of the tree.
@@ -47,10 +60,14 @@ struct Sample {
     angle: f64,
     /// Distance of light through the z-field, m.
     metres: f64,
-    /// Opacity of the view ray.
-    alpha: f64,
     /// Whether the sun reaches what the view ray meets of the mesh.
     lit: bool,
+    /// Cosines of the zenith angles of viewer and sun.
+    up: [f64; 2],
+    /// Height of the z-field's point, in scaled space.
+    height: f64,
+    /// Radiance that goes to the viewer, per irradiance, if the sun reaches it.
+    sent: f64,
     /// Above the crown's base: whether that is foliage, whether the sun shines on the side that is seen, |n·l|.
     leaf: Option<(bool, bool, f64)>,
 }
@@ -62,6 +79,8 @@ pub struct Measured {
     pub shadow: [f64; 2],
     /// How its leaves are turned.
     pub turned: Turned,
+    /// What these leave out of the share that is lit, and of the light that is sent.
+    pub corrections: [Correction; 2],
 }
 
 /// What the mesh is made of, beside its shape.
@@ -70,6 +89,8 @@ pub struct Matter<'a> {
     pub foliage: &'a [bool],
     /// Height of the crown's base, m.
     pub base: f32,
+    /// Luminances of the reflectance and transmittance of leaves, and of the reflectance of bark.
+    pub luminances: [f64; 3],
 }
 
 /// Samples in a cell of phase angle and distance.
@@ -77,8 +98,6 @@ pub struct Matter<'a> {
 pub struct LitCell {
     /// Pairs of rays.
     pub pairs: f64,
-    /// Opacity of their view rays together.
-    pub weight: f64,
     /// Mean phase angle, rad.
     pub angle: f64,
     /// Mean distance that light goes through the z-field, m.
@@ -94,7 +113,7 @@ pub struct LitCell {
 pub fn lit_cells(mesh: &Mesh, bake: &SpeciesBake, seed: u32) -> Result<Vec<LitCell>> {
     let surface = Surface::new(mesh)?;
     let foliage: Vec<bool> = mesh.materials.iter().map(|m| m.foliage).collect();
-    let matter = Matter { foliage: &foliage, base: bake.crown.base };
+    let matter = Matter { foliage: &foliage, base: bake.crown.base, luminances: [0.0; 3] };
     Ok(cells(&samples(&surface, &matter, &bake.views, seed), f64::from(bake.crown.frame.half_height)))
 }
 
@@ -102,7 +121,35 @@ pub fn lit_cells(mesh: &Mesh, bake: &SpeciesBake, seed: u32) -> Result<Vec<LitCe
 pub fn measure(surface: &Surface, matter: &Matter, field: &ZField) -> Measured {
     let samples = samples(surface, matter, field, SEED);
     let cells = cells(&samples, f64::from(surface.frame.half_height));
-    Measured { shadow: fit(&cells), turned: turned(&samples) }
+    let (shadow, turned) = (fit(&cells), turned(&samples));
+    Measured { shadow, turned, corrections: corrections(&samples, (surface.frame, matter), shadow, &turned) }
+}
+
+/// Corrections of the law's share that is lit, and of the light that it sends.
+fn corrections(
+    samples: &[Sample],
+    (frame, matter): (Frame, &Matter),
+    [c, tau]: [f64; 2],
+    turned: &Turned,
+) -> [Correction; 2] {
+    let [leaf, passed, bark] = matter.luminances;
+    let reflected = f64::from(turned.reflected) * leaf + f64::from(turned.bark_reflected) * bark;
+    let passed = f64::from(turned.passed) * passed;
+    let bark_ratio = bark / (reflected + passed).max(1e-3);
+    // Of all of a crown only the base matters here.
+    let crown = Crown { frame, base: matter.base, ..Crown::default() };
+    let mut fits = [Fit::default(); 2];
+    for s in samples {
+        let terms = correction::terms(s.up[0], s.up[1], s.angle);
+        let lit = light::self_shadow(s.angle, s.metres, c, tau);
+        let turned = light::turned_reflectance(f64::from(turned.slope_of()), s.angle);
+        let colour = 1.0 + f64::from(crown.bark_share(s.height as f32)) * (bark_ratio - 1.0);
+        let sent = lit * colour * light::leaf_phase(s.angle, reflected * turned, passed);
+        let truth = f64::from(u8::from(s.lit));
+        fits[0].add(&terms, (transfer::strength(s.angle), s.height, 1.0), (lit, truth));
+        fits[1].add(&terms, (1.0, s.height, 1.0), (sent, truth * s.sent));
+    }
+    fits.map(|f| f.solve())
 }
 
 fn samples(surface: &Surface, matter: &Matter, field: &ZField, seed: u32) -> Vec<Sample> {
@@ -132,9 +179,9 @@ fn turned(samples: &[Sample]) -> Turned {
     let (mut seen, mut seen_bark) = (0.0, 0.0);
     for s in samples {
         let Some((foliage, same, cosine)) = s.leaf else { continue };
-        seen += s.alpha;
+        seen += 1.0;
         if !foliage {
-            seen_bark += s.alpha;
+            seen_bark += 1.0;
         }
         if !s.lit {
             continue;
@@ -144,11 +191,11 @@ fn turned(samples: &[Sample]) -> Turned {
         let of = |wanted: bool| if wanted { cosine } else { 0.0 };
         let x = of(foliage && same);
         let terms = [g * x, s.angle * g * x, g * g, s.angle * g * g, s.angle * s.angle * g * g];
-        lit.iter_mut().zip(terms).for_each(|(sum, term)| *sum += s.alpha * term);
-        passed[0] += s.alpha * h * of(foliage && !same);
-        passed[1] += s.alpha * h * h;
-        bark[0] += s.alpha * g * of(!foliage && same);
-        bark[1] += s.alpha * g * g;
+        lit.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        passed[0] += h * of(foliage && !same);
+        passed[1] += h * h;
+        bark[0] += g * of(!foliage && same);
+        bark[1] += g * g;
     }
     let [gx, agx, gg, agg, aagg] = lit;
     let det = gg * aagg - agg * agg;
@@ -167,9 +214,10 @@ fn turned(samples: &[Sample]) -> Turned {
     }
 }
 
-/// A direction of the upper hemisphere, by projected solid angle: as light comes to level ground, and goes from it.
+/// A direction of the upper hemisphere, with a density of √z over the solid angle: between that and the projected one, so that neither
+/// suns and views along the ground nor those from above are few.
 fn direction(stream: &mut Stream) -> DVec3 {
-    let (z, turn) = ((1.0 - 0.999 * stream.unit()).sqrt(), TAU * stream.unit());
+    let (z, turn) = ((1.0 - 0.99 * stream.unit()).powf(2.0 / 3.0), TAU * stream.unit());
     let r = (1.0 - z * z).sqrt();
     DVec3::new(r * turn.cos(), r * turn.sin(), z)
 }
@@ -203,37 +251,42 @@ fn sample(
     let normal = rays.normal(face);
     let (seen_from, lit_from) = (normal.dot(eye), normal.dot(to_sun));
     let foliage = matter.foliage[surface.faces[face as usize].material as usize];
+    let same = seen_from * lit_from > 0.0;
+    let [leaf, passed, bark] = matter.luminances;
+    let scattered = match (foliage, same) {
+        (true, true) => leaf,
+        (true, false) => passed,
+        (false, true) => bark,
+        (false, false) => 0.0,
+    };
     Some(Sample {
         angle: light::angle_between(view.into(), sun.into()),
         metres: metres.max(0.0),
-        alpha: seen.alpha,
         lit: !rays.occluded(hit, to_sun, 1e-4 * surface.frame.half_height, stack),
-        leaf: (hit.z > matter.base).then_some((
-            foliage,
-            seen_from * lit_from > 0.0,
-            f64::from(lit_from.abs()),
-        )),
+        up: [view.z, sun.z],
+        height: seen.point.z,
+        sent: scattered * f64::from(lit_from.abs()) / PI,
+        leaf: (hit.z > matter.base).then_some((foliage, same, f64::from(lit_from.abs()))),
     })
 }
 
 fn cells(samples: &[Sample], unit: f64) -> Vec<LitCell> {
     let mut cells = vec![LitCell::default(); (ANGLES.len() - 1) * (DISTANCES.len() - 1)];
-    for &Sample { angle, metres, alpha, lit, .. } in samples {
+    for &Sample { angle, metres, lit, .. } in samples {
         let place =
             |edges: &[f64], x: f64| edges.iter().rposition(|e| *e <= x).unwrap_or(0).min(edges.len() - 2);
         let (i, j) = (place(&ANGLES, angle * 180.0 / PI), place(&DISTANCES, metres / unit));
         let c = &mut cells[i * (DISTANCES.len() - 1) + j];
         c.pairs += 1.0;
-        c.weight += alpha;
-        c.angle += alpha * angle;
-        c.metres += alpha * metres;
-        c.lit += alpha * f64::from(u8::from(lit));
+        c.angle += angle;
+        c.metres += metres;
+        c.lit += f64::from(u8::from(lit));
     }
     cells.retain(|c| c.pairs >= LEAST);
     for c in &mut cells {
-        c.angle /= c.weight;
-        c.metres /= c.weight;
-        c.lit /= c.weight;
+        c.angle /= c.pairs;
+        c.metres /= c.pairs;
+        c.lit /= c.pairs;
     }
     cells
 }
@@ -244,7 +297,7 @@ fn fit(cells: &[LitCell]) -> [f64; 2] {
     let loss = |x: [f64; 2]| -> f64 {
         cells
             .iter()
-            .map(|c| c.weight * (light::self_shadow(c.angle, c.metres, x[0], x[1] * x[1]) - c.lit).powi(2))
+            .map(|c| c.pairs * (light::self_shadow(c.angle, c.metres, x[0], x[1] * x[1]) - c.lit).powi(2))
             .sum()
     };
     let (mut x, mut damping) = ([0.5, 0.7], 1e-3);
@@ -254,8 +307,8 @@ fn fit(cells: &[LitCell]) -> [f64; 2] {
             let p = light::self_shadow(c.angle, c.metres, x[0], x[1] * x[1]);
             let d = [-p * c.angle.sqrt(), -p * (c.angle * c.metres).sqrt()];
             for i in 0..2 {
-                g[i] += c.weight * d[i] * (p - c.lit);
-                (0..2).for_each(|j| h[i][j] += c.weight * d[i] * d[j]);
+                g[i] += c.pairs * d[i] * (p - c.lit);
+                (0..2).for_each(|j| h[i][j] += c.pairs * d[i] * d[j]);
             }
         }
         let (a, d) = (h[0][0] * (1.0 + damping), h[1][1] * (1.0 + damping));

@@ -4,6 +4,7 @@ use crate::bake::{Baked, tables};
 use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Resource, Sampler, vk};
 use crate::land::density::{DensityMap, HEIGHT_SOFTNESS, SLOPE_SOFTNESS, density_map};
+use crate::physics::correction::Correction;
 use crate::physics::masks::combination_table;
 use crate::physics::outline;
 use crate::physics::raster::Raster;
@@ -216,6 +217,12 @@ fn mean_squared_scale(species: &Species) -> f64 {
     }
 }
 
+/// A correction's coefficients as the table has them.
+fn coefficients(c: &Correction) -> [[f32; 4]; 4] {
+    let all: Vec<f32> = c.middle.iter().chain(&c.change).copied().collect();
+    std::array::from_fn(|k| std::array::from_fn(|i| all[4 * k + i]))
+}
+
 fn rows(
     scene: &Scene,
     plan: &Plan,
@@ -254,6 +261,8 @@ fn rows(
             albedo: bake.sky_albedo(),
             sky: tables.sky,
             turning: bake.turned.slope_of(),
+            lit: coefficients(&crown.lit),
+            sent: coefficients(&bake.sent()),
             transmittance,
             range: plan.species_range[k] as f32,
             crown_radius: crown.radius,

@@ -1,4 +1,4 @@
-//! All cascades in one layered pass: the terrain, then the trees' backs (BN12, section 5). What was drawn is kept: a frame draws
+//! All cascades in one layered pass: the terrain, then the trees, where they stop light. What was drawn is kept: a frame draws
 //! the pages that it needs and the frames before did not.
 
 use super::receivers;

@@ -3,8 +3,10 @@
 
 use glam::Vec3;
 
+use super::correction::Correction;
+
 /// The affine map between a tree and its scaled space, p' = S⁻¹ (p − o): a cylinder r ≤ 1, |z| ≤ 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Frame {
     /// Height of o above the trunk's base, m; o is on the trunk's axis.
     pub centre: f32,
@@ -32,7 +34,7 @@ impl Frame {
 }
 
 /// A tree of scale 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Crown {
     /// Its scaled space.
     pub frame: Frame,
@@ -46,6 +48,10 @@ pub struct Crown {
     pub leaf_shadow: f32,
     /// τ of the crown's self-shadow, 1/(m rad).
     pub extinction: f32,
+    /// What that law leaves out of the share that is lit; nothing in the hotspot, where all is lit.
+    pub lit: Correction,
+    /// What that law and uniform leaves leave out of the sunlight that is sent to the viewer.
+    pub sent: Correction,
 }
 
 impl Crown {

@@ -3,6 +3,11 @@
 
 use std::f64::consts::PI;
 
+/// Luminance of linear RGB (Rec. 709).
+pub fn luminance<T: Copy + Into<f64>>([r, g, b]: [T; 3]) -> f64 {
+    0.2126 * r.into() + 0.7152 * g.into() + 0.0722 * b.into()
+}
+
 /// Angle between two unit vectors, rad; atan2 keeps its precision at 0 and π, where acos loses it.
 pub fn angle_between(a: [f64; 3], b: [f64; 3]) -> f64 {
     let c = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];

@@ -1,5 +1,6 @@
 //! f64 models of the papers, without Vulkan: the oracle for the shaders of the same name in `shaders/physics/`.
 
+pub mod correction;
 pub mod crown;
 pub mod handover;
 pub mod hash;

@@ -10,7 +10,10 @@
 //! spherical harmonics of band 1, and of band 2 without 3z² − 1, which over the upper hemisphere, from where the sun shines, is much
 //! like z (leaving it out costs 0.01 of the 0.6 to 0.7 of the variance between texels that all nine explain). w is for the hotspot: at
 //! the phase angle α = 0 all that is seen is lit, and from there shadows grow with the root of the angle, which slow terms cannot
-//! follow (without w a crown is 8 to 11 % too dark there). On average over a crown M is 1.
+//! follow (without w a crown is 8 to 11 % too dark there). On average over a crown M is about 1: what is amiss of that goes into
+//! [`Transfer::sent`].
+
+use super::correction::Correction;
 
 /// Coefficients that a texel of one texture holds; each band has a texture.
 pub const TERMS: usize = 4;
@@ -28,6 +31,9 @@ pub struct Transfer {
     pub resolution: u32,
     /// Per band and level, all layers one after the other, rows from the bottom (v = 0) up: coefficients of each texel, encoded.
     pub bands: Vec<Vec<Vec<u8>>>,
+    /// What the crown's laws and transfer together leave out of the sunlight that is sent to the viewer, in place of [`super::crown::Crown`]'s:
+    /// few terms a texel cannot keep the mean over a crown for every pair of directions.
+    pub sent: Correction,
 }
 
 /// w: the strength of transfer at a phase angle, rad.

@@ -53,7 +53,9 @@ fn check(gpu: &Gpu, renderer: &Renderer) -> Vec<usize> {
         for seed in &all[quad.region as usize * capacity..][..count] {
             if casts(quad, seed) {
                 let cascade = blocks[quad.block as usize].cascade as u32;
-                want[quad.block as usize].push(hash(seed.identity ^ HASH_DITHER ^ cascade));
+                // With the tree's name in its last bits.
+                let name = hash(seed.identity ^ HASH_DITHER) & 255;
+                want[quad.block as usize].push(hash(seed.identity ^ HASH_DITHER ^ cascade) & !255 | name);
             }
         }
     }

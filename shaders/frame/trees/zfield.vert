@@ -32,8 +32,8 @@ layout(location = 17) flat out vec4 weights;    // of two views, of two light vi
 layout(location = 18) flat out vec4 optics;     // mip, tau of the self-shadow times the phase angle, opacity factor, height of the eye in the tree
 layout(location = 19) flat out vec4 sun;        // w: 1 / r2 of the hole
 layout(location = 20) flat out vec4 sky;        // w: metres from the centre to the top
-layout(location = 21) flat out uvec4 tree_bits; // mask row; cascade | from below << 4 | species << 8
-layout(location = 22) flat out vec2 own;       // dither, c of the self-shadow times the root of the phase angle
+layout(location = 21) flat out uvec4 tree_bits; // mask row; cascade | from below << 4 | species << 5 | name << 8 | half of the lit share's change << 16
+layout(location = 22) flat out vec4 own;       // dither, c of the self-shadow times the root of the phase angle, lit share's correction, sun's change
 layout(location = 23) flat out vec4 bark_ratio; // relative colour; w: height under which there is only bark
 layout(location = 24) flat out vec4 mean_sun;   // average light, times nu; w: 1 - nu
 layout(location = 26) flat out vec4 sun_from;   // in the tree's own axes; w: strength of light transfer
@@ -80,12 +80,13 @@ void main() {
     float phase_angle = angle_between(-t.centre, v.sun_direction);
     sun_from = vec4(toward, transfer_strength(sqrt(phase_angle)));
     optics = vec4(t.mip, kind.extinction * phase_angle / t.scale, t.fade, c.z);
-    sun = vec4(t.sun, t.hole);
+    vec2 hole = unpackHalf2x16(t.hole_change), weight = unpackHalf2x16(t.own_lit), lit = unpackHalf2x16(t.mean_lit_change);
+    sun = vec4(t.sun, hole.x);
     sky = vec4(t.sky, plane.half_extent.z);
     uvec3 row = masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz;
-    tree_bits = uvec4(row, t.cascade | (below ? 16u : 0u) | t.species << 8u);
+    tree_bits = uvec4(row, t.cascade | (below ? 16u : 0u) | t.species << 5u | caster_name(t.identity) << 8u | (t.mean_lit_change & 0xffff0000u));
     bark_ratio = vec4(kind.bark_ratio, kind.bare_below);
-    mean_sun = vec4(t.mean_sun, t.own);
-    mean_sky = vec4(t.mean_sky, t.mean_lit);
-    own = vec2(unit(hash(t.identity ^ HASH_DITHER)), kind.leaf_shadow * sqrt(phase_angle));
+    mean_sun = vec4(t.mean_sun, weight.x);
+    mean_sky = vec4(t.mean_sky, lit.x);
+    own = vec4(unit(hash(t.identity ^ HASH_DITHER)), kind.leaf_shadow * sqrt(phase_angle), weight.y, hole.y);
 }

@@ -1,13 +1,15 @@
-// Light on what is seen of a z-field tree (BN12, section 5). Needs physics/{light,zfield,shadow,transfer}.glsl.
+// Light on what is seen of a z-field tree (BN12, section 5). Needs physics/{light,correction,zfield,shadow,transfer}.glsl.
 
 // What is the same all over a tree.
 struct TreeLight {
-    vec3 sun;           // radiance of a lit leaf
+    vec3 sun;           // radiance of a lit leaf at height 0
+    float sun_change;   // of that with the height, over it
     vec3 sky;           // radiance of a leaf under the whole sky
     vec3 mean_sun;      // average radiance from the sun, times nu of BN12 eq. 22
     vec3 mean_sky;      // average radiance from the sky, times nu
     float mean_lit;     // average lit fraction, times nu
     float own;          // 1 - nu: weight of the tree's own light
+    vec2 lit;           // correction of the share that is lit, as a line in the height
     vec3 bark_ratio;    // reflectance of bark over that of leaves
     float bare_below;   // height under which there is only bark
     float half_height;  // metres from the centre to the top
@@ -17,6 +19,7 @@ struct TreeLight {
     vec3 toward;        // the sun, in the tree's own axes
     float transfer;     // strength of light transfer
     uint cascade;       // for shadow lookups; MAX_CASCADES: none
+    uint name;          // in the shadow maps
 };
 
 // The ray from a seen point to the sun.
@@ -76,9 +79,11 @@ TreeParts tree_light(sampler2DArray views, sampler2DArray shadow_map, sampler2DA
         float through = self_shadow(t.leaf, t.extinction, metres);
         vec3 entry = ray.entry;
         entry.z += metres * ray.deeper;
-        float visible = sun_visibility(shadow_map, entry, vec2(0.0), ray.turn, min(t.cascade, MAX_CASCADES - 1u));
+        float visible = sun_visibility(shadow_map, entry, vec2(0.0), ray.turn, min(t.cascade, MAX_CASCADES - 1u), t.name,
+                                       4.0 * t.half_height * ray.deeper);
         through *= t.cascade < MAX_CASCADES ? visible : 1.0;
-        float reached = through;
+        light.lit += t.own * min(through * correction_at(t.lit, height), 1.0);
+        float reached = through * correction_at(vec2(1.0, t.sun_change), height);
         // From below, views show the other side.
         if (quality.bands > 0u && !below) {
             vec3 shares = at.shares / max(at.shares.x + at.shares.y + at.shares.z, 1e-6);
@@ -89,7 +94,6 @@ TreeParts tree_light(sampler2DArray views, sampler2DArray shadow_map, sampler2DA
             reached *= max(1.0 + t.transfer * x, 0.0);
         }
         light.sun += t.sun * colour * reached;
-        light.lit += t.own * through;
     }
     // Depth under the top of the canopy, for the sky through the hole around the tree.
     float below_top = max(1.0 - height, 0.0) * t.half_height;

@@ -1,6 +1,7 @@
 // One fragment of a z-field tree (BN12, section 5): iterations for the view ray and the light ray, light, depth and sample
 // mask, all from the same last fetch.
 #include "physics/light.glsl"
+#include "physics/correction.glsl"
 #include "physics/masks.glsl"
 #include "physics/zfield.glsl"
 #include "physics/shadow.glsl"
@@ -19,7 +20,7 @@ layout(location = 18) flat in vec4 optics;
 layout(location = 19) flat in vec4 sun;
 layout(location = 20) flat in vec4 sky;
 layout(location = 21) flat in uvec4 tree_bits;
-layout(location = 22) flat in vec2 own; // dither, c of the self-shadow times the root of the phase angle
+layout(location = 22) flat in vec4 own; // dither, c of the self-shadow times the root of the phase angle, lit share's correction, sun's change
 layout(location = 23) flat in vec4 bark_ratio;
 layout(location = 24) flat in vec4 mean_sun;
 layout(location = 25) flat in vec4 mean_sky;
@@ -60,7 +61,7 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
     sun_part = mean_sun.rgb;
     sky_part = mean_sky.rgb;
     lit = HAS_SUN ? mean_sky.w : 0.0;
-    uint species = (tree_bits.w >> 8u) + 1u;
+    uint species = (tree_bits.w >> 5u & 7u) + 1u;
     if (CONVERGED) return species;
     LightRay ray;
     for (int i = 0; i < 3; i++) {
@@ -72,8 +73,9 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
     ray.entry = mix(shadow_p, shadow_c.xyz, s);
     ray.deeper = shadow_c.w;
     ray.turn = view.v.cascade_turn[min(tree_bits.w & 15u, MAX_CASCADES - 1u)].xy;
-    TreeLight tree = TreeLight(sun.rgb, sky.rgb, mean_sun.rgb, mean_sky.rgb, mean_sky.w, mean_sun.w, bark_ratio.rgb, bark_ratio.w, sky.w,
-                               sun.w, own.y, optics.y, sun_from.xyz, sun_from.w, tree_bits.w & 15u);
+    TreeLight tree = TreeLight(sun.rgb, own.w, sky.rgb, mean_sun.rgb, mean_sky.rgb, mean_sky.w, mean_sun.w,
+                               vec2(own.z, unpackHalf2x16(tree_bits.w).y), bark_ratio.rgb, bark_ratio.w, sky.w,
+                               sun.w, own.y, optics.y, sun_from.xyz, sun_from.w, tree_bits.w & 15u, tree_bits.w >> 8u & 255u);
     TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, tree, at, p, d, layers, below, optics.x, MAGNIFIED, s,
                                  mix(view_p[0].w, optics.w, s), ray, LightQuality(HAS_SUN, LIGHT_ITERATIONS, TRANSFER_BANDS));
     sun_part = parts.sun;

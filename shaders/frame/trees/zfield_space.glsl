@@ -21,13 +21,13 @@ Tree fetch_tree(usamplerBuffer trees, uint index) {
     c = texelFetch(trees, at + 6);
     d = texelFetch(trees, at + 7);
     t.sun = uintBitsToFloat(a.xyz);
-    t.hole = uintBitsToFloat(a.w);
+    t.hole_change = a.w;
     t.sky = uintBitsToFloat(b.xyz);
     t.cascade = b.w;
     t.mean_sun = uintBitsToFloat(c.xyz);
-    t.own = uintBitsToFloat(c.w);
+    t.own_lit = c.w;
     t.mean_sky = uintBitsToFloat(d.xyz);
-    t.mean_lit = uintBitsToFloat(d.w);
+    t.mean_lit_change = d.w;
     return t;
 }
 

@@ -6,6 +6,7 @@
 
 use crate::bake::SpeciesBake;
 use crate::physics::crown::Crown;
+use crate::physics::light::luminance;
 use crate::physics::transfer::TERMS;
 
 /// What leaves do with light, luminances.
@@ -23,16 +24,11 @@ impl LeafOptics {
     /// Of a baked species.
     pub fn of(bake: &SpeciesBake) -> Self {
         LeafOptics {
-            scattered: bake.crown_leaves().map(luminance),
+            scattered: bake.crown_leaves().map(|c| luminance(c) as f32),
             turning: bake.turned.slope_of(),
-            albedo: luminance(bake.sky_albedo()),
+            albedo: luminance(bake.sky_albedo()) as f32,
         }
     }
-}
-
-/// Of linear RGB (Rec. 709).
-fn luminance([r, g, b]: [f32; 3]) -> f32 {
-    0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
 /// What a viewer sees of a crown on a ray.
@@ -53,6 +49,8 @@ pub struct Cast {
     pub alpha: f32,
     /// Depth along w of its back, the end away from the sun.
     pub back: f32,
+    /// Depth along w of its front.
+    pub front: f32,
 }
 
 /// Coefficients of light transfer ([`crate::physics::transfer`]) of a point that is seen; by default they change nothing.

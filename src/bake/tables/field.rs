@@ -77,15 +77,16 @@ impl Level {
         [rb & 0xffff, rb >> 16, ga >> 16].map(|x| x as f32 * (1.0 / 65280.0))
     }
 
-    /// Bilinear sample of farthest depth and opacity.
+    /// Bilinear sample of nearest and farthest depth and opacity.
     #[inline(always)]
-    fn far(&self, layer: u32, x: f32, y: f32) -> Option<[f32; 2]> {
+    fn ends(&self, layer: u32, x: f32, y: f32) -> Option<[f32; 3]> {
         let (t, w) = self.around(layer, x, y)?;
-        let mut ga = 0;
+        let (mut rb, mut ga) = (0, 0);
         for (t, w) in t.iter().zip(w) {
+            rb += (t & 0xff00ff) * w;
             ga += (t >> 8 & 0xff00ff) * w;
         }
-        Some([ga & 0xffff, ga >> 16].map(|x| x as f32 * (1.0 / 65280.0)))
+        Some([rb & 0xffff, ga & 0xffff, ga >> 16].map(|x| x as f32 * (1.0 / 65280.0)))
     }
 
     /// The texel at a position, unfiltered; outside, that of the field's border.
@@ -182,7 +183,7 @@ impl FieldCrown {
         let level = Self::level(bake, resolution);
         let r = f64::from(bake.views.resolution);
         FieldCrown {
-            crown: bake.crown,
+            crown: Crown { sent: bake.sent(), ..bake.crown },
             leaf: LeafOptics::of(bake),
             rings: bake.views.n,
             border: r / (r - 2.0),
@@ -284,16 +285,22 @@ impl CrownModel for FieldCrown {
 
     #[inline]
     fn cast(&self, aim: &FieldAim, a: f32, b: f32) -> Cast {
-        let (mut sum_s, mut alpha) = (0.0, 0.0);
+        let (mut back, mut front, mut alpha) = (0.0, 0.0, 0.0);
         for view in &aim.views {
             let x = 0.5 + a * view.u[0] + b * view.u[1];
             let y = 0.5 + a * view.v[0] + b * view.v[1];
-            let Some([g, t_alpha]) = self.fine.far(view.layer, x, y) else { continue };
+            let Some([r, g, t_alpha]) = self.fine.ends(view.layer, x, y) else { continue };
             let across = a * view.depth[0] + b * view.depth[1];
             alpha += view.weight * t_alpha;
-            sum_s += view.weight * (SQRT_2 * (2.0 * g - t_alpha) - t_alpha * across) * view.inverse_depth;
+            let along = |z: f32| view.weight * (SQRT_2 * (2.0 * z - t_alpha) - t_alpha * across);
+            back += along(g) * view.inverse_depth;
+            front += along(r) * view.inverse_depth;
         }
-        if alpha < FAINTEST { Cast::default() } else { Cast { alpha: alpha.min(1.0), back: sum_s / alpha } }
+        if alpha < FAINTEST {
+            Cast::default()
+        } else {
+            Cast { alpha: alpha.min(1.0), back: back / alpha, front: front / alpha }
+        }
     }
 
     #[inline]

@@ -5,7 +5,7 @@ use super::measure::{Estimate, Measured, PairEstimate};
 use super::{ForestSettings, mean_area, sky};
 use crate::physics::crown::Crown;
 use crate::physics::tables::ForestTables;
-use crate::physics::tables::{density_node, light_node, secant, zenith_node};
+use crate::physics::tables::{density_node, light_node, lit_of_seen, secant, zenith_node};
 
 /// A transmittance counts as measured when it is this many times its standard error.
 const SIGNIFICANT: f64 = 4.0;
@@ -86,9 +86,13 @@ pub fn tables(
                     let at = ((x * n + v) * n + l) * n + k;
                     let leaf = e.leaf.0.clamp(0.0, 1.0);
                     let w = joint[x] / (secant(theta_v) + secant(theta_l));
-                    t.pair[at] = [w, leaf, e.bark.0.clamp(0.0, 1.0 - leaf), e.transfer.0].map(|v| v as f32);
+                    // Of an even layer of these paths.
+                    let even = lit_of_seen(nodes[x] * path[x], nodes[x] * joint[x]);
+                    let [leaf, bark] = [leaf, e.bark.0.clamp(0.0, 1.0 - leaf)].map(|t| t / even);
+                    t.pair[at] = [w, leaf, bark, e.transfer.0].map(|v| v as f32);
                     let ground = if x == 0 { 0.0 } else { e.ground.1 };
-                    t.pair_stderr[at] = [ground, e.leaf.1, e.bark.1, e.transfer.1].map(|e| e as f32);
+                    t.pair_stderr[at] =
+                        [ground, e.leaf.1 / even, e.bark.1 / even, e.transfer.1].map(|e| e as f32);
                 }
             }
         }

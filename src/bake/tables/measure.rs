@@ -13,10 +13,9 @@ use super::crown::{CrownModel, TransferAt};
 use super::patch::{Patch, Segment, TURNS, patches};
 use super::sky::SkySeen;
 use super::statistics::{Moments, Sequence, mean, product, ratio};
-use super::trace::{Azimuth, Heading, Hit, Light, Marks, Receiver, light, own, view};
+use super::trace::{Azimuth, Heading, Hit, Light, Marks, Receiver, Toward, light, own, view};
 use crate::physics::hash::{Stream, hash2};
 use crate::physics::tables::{azimuth_node, density_node, light_node, zenith_node};
-use crate::physics::transfer;
 use crate::progress::Progress;
 
 /// Independent patches.
@@ -444,7 +443,12 @@ impl<C: CrownModel, const M: usize> Scene<'_, C, M> {
                 let azimuth = Azimuth::new(s.angle);
                 let (position, z) = heading.point(s.position, &azimuth, s.hit.metres);
                 points.push(CrownPoint {
-                    receiver: Receiver { position, z, tree: Some(patch.trees[s.hit.tree as usize]) },
+                    receiver: Receiver {
+                        position,
+                        z,
+                        tree: Some(patch.trees[s.hit.tree as usize]),
+                        height: s.hit.height,
+                    },
                     azimuth: s.angle,
                     side: side(CROWNS, p, s.ray),
                     weight: s.weight.map(|w| (f64::from(w) / share) as f32),
@@ -462,9 +466,8 @@ impl<C: CrownModel, const M: usize> Scene<'_, C, M> {
     fn pairs(&self, points: &ViewPoints<C::Aim, M>, theta_l: f64) -> Vec<PairEstimate> {
         let (n, m) = (self.forest.angles as usize, self.densities());
         let heading = Heading::new(self.crown, theta_l, self.vertical_scale);
-        let angles: Vec<f32> =
-            (0..n).map(|k| points.heading.angle_to(&heading, azimuth_node(n, k)) as f32).collect();
-        let strength: Vec<f32> = angles.iter().map(|a| transfer::strength(f64::from(*a)) as f32).collect();
+        let towards: Vec<Toward> =
+            (0..n).map(|k| Toward::new(self.crown, &points.heading, &heading, azimuth_node(n, k))).collect();
         let mut marks = Marks::new(self.patches.iter().map(|p| p.trees.len()).max().unwrap_or(0));
         // By patch: the mean share of lit ground; by azimuth and patch, sums of y, t_l, and lit leaves and bark.
         let lit: Vec<[f64; M]> = (0..PATCHES).map(|p| self.lit(p, &heading, &mut marks)).collect();
@@ -475,7 +478,7 @@ impl<C: CrownModel, const M: usize> Scene<'_, C, M> {
             let mut products = vec![[[0f32; M]; 5]; n];
             for g in &points.ground[p] {
                 marks.set(&g.front);
-                let receiver = Receiver { position: g.position, z: 0.0, tree: None };
+                let receiver = Receiver { position: g.position, z: 0.0, tree: None, height: 0.0 };
                 for k in 0..n {
                     let azimuth = Azimuth::new(g.azimuth + g.side * azimuth_node(n, k));
                     let receiver = (&receiver, 0.0, &marks);
@@ -507,20 +510,20 @@ impl<C: CrownModel, const M: usize> Scene<'_, C, M> {
                 for (k, trees) in trees.iter_mut().enumerate() {
                     let trees = &mut trees[p];
                     let azimuth = Azimuth::new(c.azimuth + c.side * azimuth_node(n, k));
-                    let (own, entry) = own(self.crown, patch, &heading, &azimuth, (&c.receiver, angles[k]));
-                    trees.isolated.add(&c.weight, own, c.bark_share);
+                    let own = own(self.crown, patch, &heading, &azimuth, (&c.receiver, &towards[k]));
+                    trees.isolated.add(&c.weight, own.lit, c.bark_share);
                     if c.front.is_none() {
                         continue;
                     }
-                    let receiver = (&c.receiver, entry, &marks);
+                    let receiver = (&c.receiver, own.entry, &marks);
                     let light: Light<M> =
                         light(self.crown, patch, &heading, &azimuth, receiver, &self.q, self.largest);
-                    trees.sampled.add(&c.weight, own, c.bark_share);
+                    trees.sampled.add(&c.weight, own.lit, c.bark_share);
                     let weight = std::array::from_fn(|x| c.weight[x] * light.joint[x]);
-                    trees.lit.add(&weight, own, c.bark_share);
+                    trees.lit.add(&weight, own.lit, c.bark_share);
                     let toward = c.receiver.tree.map_or([0.0, 0.0, 1.0], |t| heading.toward(&azimuth, &t));
-                    let transfer = c.transfer.of(toward, strength[k]);
-                    add(&mut trees.transferred, &weight.map(|w| w * own * transfer));
+                    let sent = own.sent * c.transfer.of(toward, towards[k].strength());
+                    add(&mut trees.transferred, &weight.map(|w| w * sent));
                 }
             }
         }
@@ -574,7 +577,7 @@ impl<C: CrownModel, const M: usize> Scene<'_, C, M> {
         let (patch, random) = (&self.patches[p], sequence(MARGINAL, p));
         for i in 0..SINGLES * self.grounds {
             let (position, azimuth) = self.ground_point(patch, random.at(i));
-            let receiver = Receiver { position, z: 0.0, tree: None };
+            let receiver = Receiver { position, z: 0.0, tree: None, height: 0.0 };
             let around = Azimuth::new(azimuth);
             let mut light: Light<M> =
                 light(self.crown, patch, heading, &around, (&receiver, 0.0, marks), &self.q, self.largest);

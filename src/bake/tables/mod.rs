@@ -3,7 +3,7 @@
 //!
 //! What is measured is what the near renderer draws, in expectation, so that radiance is the same at any distance: opacity,
 //! depth and sky visibility of the iterated view ray, the light ray's path through the own crown, and the shadow maps' one
-//! look at the back of every other crown.
+//! look at where every other crown stops light.
 
 mod crown;
 mod field;

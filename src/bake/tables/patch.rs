@@ -187,6 +187,7 @@ impl Patch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::physics::correction::Correction;
     use crate::physics::crown::Frame;
 
     fn forest(poisson: bool) -> ForestSettings {
@@ -205,6 +206,8 @@ mod tests {
         height: 10.0,
         leaf_shadow: 0.0,
         extinction: 1.0,
+        lit: Correction::NONE,
+        sent: Correction::NONE,
     };
 
     #[test]

@@ -18,7 +18,9 @@ use super::ForestSettings;
 use super::crown::LeafOptics;
 use crate::physics::light;
 use crate::physics::tables::ForestTables;
-use crate::physics::tables::{angles, density_node, pair, unscaled_zenith as zenith, zenith_node};
+use crate::physics::tables::{
+    angles, density_node, light as sunlight, unscaled_zenith as zenith, zenith_node,
+};
 
 /// Bins an octave of Λd², and octaves from 2⁻¹⁶ on.
 const BINS: f64 = 8.0;
@@ -83,10 +85,12 @@ pub fn fill(t: &mut ForestTables, seen: &[SkySeen], leaf: &LeafOptics, forest: &
     let errors = ForestTables { pair: t.pair_stderr.clone(), ..t.clone() };
     for k in 0..m * n {
         let x = density_node(m, k / n, f64::from(t.max_thickness));
-        let [lit_leaf, lit_bark] = sky(t, leaf, zenith_node(n, k % n), x, |p| [p[1] * p[3], p[2] * p[3]]);
+        let [lit_leaf, lit_bark] = sky(t, leaf, zenith_node(n, k % n), x, |[leaf, bark, transfer]| {
+            [leaf * transfer, bark * transfer]
+        });
         t.view[k][1..3].copy_from_slice(&[lit_leaf as f32, lit_bark as f32]);
         // As if all suns were off by one and the same: at most that.
-        let error = sky(&errors, leaf, zenith_node(n, k % n), x, |p| [p[1], p[2]]);
+        let error = sky(&errors, leaf, zenith_node(n, k % n), x, |[leaf, bark, _]| [leaf, bark]);
         t.view_stderr[k][1..3].copy_from_slice(&error.map(|e| e as f32));
     }
     let k = f64::from(t.vertical_scale);
@@ -136,13 +140,13 @@ fn law(views: &[Vec<Node>; 2]) -> ([f64; 2], f64) {
 }
 
 /// Σ over the suns of an even sky of what is scattered to a view at the zenith angle `theta_v` of scaled space, by what `part` makes
-/// of (W, T_leaf, T_bark, M), over half the albedo.
+/// of (T_leaf, T_bark, M), over half the albedo.
 fn sky(
     t: &ForestTables,
     leaf: &LeafOptics,
     theta_v: f64,
     x: f64,
-    part: impl Fn([f64; 4]) -> [f64; 2],
+    part: impl Fn([f64; 3]) -> [f64; 2],
 ) -> [f64; 2] {
     let up = [0.0, 0.0, 1.0];
     let k = f64::from(t.vertical_scale);
@@ -158,7 +162,7 @@ fn sky(
         let (a, angle) = (angles(v, l, up, k), light::angle_between(v, l));
         let turned = light::turned_reflectance(f64::from(leaf.turning), angle);
         let scattered = light::leaf_phase(angle, r * turned, p);
-        let parts = part(pair(t, a.v, a.l, a.phi, x));
+        let parts = part(sunlight(t, a.v, a.l, a.phi, x));
         sum.iter_mut().zip(parts).for_each(|(s, x)| *s += scattered * x);
     }
     let half = 0.5 * f64::from(leaf.albedo).max(1e-6);
@@ -182,7 +186,8 @@ mod tests {
             vertical_scale: 0.7,
             hole: 0.0,
             sky: [0.0; 2],
-            pair: vec![[1.0, 1.0, 0.0, 1.0]; (m * n * n * n) as usize],
+            // All that is seen is lit: T is S.
+            pair: vec![[0.0, 1.0, 0.0, 1.0]; (m * n * n * n) as usize],
             pair_stderr: vec![[0.0; 4]; (m * n * n * n) as usize],
             view: vec![[1.0, 0.0, 0.0, 0.0]; (m * n) as usize],
             view_stderr: vec![[0.0; 4]; (m * n) as usize],

@@ -6,9 +6,10 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::crown::{CrownModel, TransferAt};
+use super::crown::{Cast, CrownModel, TransferAt};
 use super::patch::{Patch, Segment, TURNS, Tree};
 use crate::physics::tables::unscaled_zenith;
+use crate::physics::{correction, transfer};
 
 /// A direction of parallel rays: their slope in metres and in the scaled space of the tree.
 pub struct Heading<A> {
@@ -282,6 +283,8 @@ pub struct Receiver {
     pub z: f32,
     /// The tree that it is on.
     pub tree: Option<Tree>,
+    /// Height in the scaled space of that tree.
+    pub height: f32,
 }
 
 /// Light on a ray, at every density.
@@ -296,17 +299,61 @@ pub struct Light<const M: usize> {
     pub overlap: f32,
 }
 
-/// What a receiver's own tree leaves of the light at a phase angle, rad, over the metres s to where the ray enters it, and s
-/// ([`crate::physics::light::self_shadow`]; metres of the model, because what is in a crown grows with it).
+/// What depends on the directions of viewer and light only: the phase angle, rad, and the crown's corrections of the share that is lit
+/// and of the light that is sent ([`crate::physics::correction`]).
+#[derive(Clone, Copy, Debug)]
+pub struct Toward {
+    angle: f32,
+    lit: [f64; 2],
+    sent: [f64; 2],
+}
+
+impl Toward {
+    /// Of two headings that an azimuth parts.
+    pub fn new<C: CrownModel>(
+        crown: &C,
+        view: &Heading<C::Aim>,
+        light: &Heading<C::Aim>,
+        azimuth: f64,
+    ) -> Self {
+        let angle = view.angle_to(light, azimuth);
+        let terms = correction::terms(view.cosine.into(), light.cosine.into(), angle);
+        let crown = crown.crown();
+        Toward {
+            angle: angle as f32,
+            lit: crown.lit.line(&terms, transfer::strength(angle)),
+            sent: crown.sent.line(&terms, 1.0),
+        }
+    }
+
+    /// Strength of light transfer.
+    pub fn strength(&self) -> f32 {
+        transfer::strength(self.angle.into()) as f32
+    }
+}
+
+/// What a receiver's own tree makes of the light.
+#[derive(Clone, Copy, Debug)]
+pub struct Own {
+    /// Share of it that is lit.
+    pub lit: f32,
+    /// Light that is sent to the viewer, over that of leaves that are all lit.
+    pub sent: f32,
+    /// Metres to where the ray enters the tree.
+    pub entry: f32,
+}
+
+/// What a receiver's own tree leaves of the light ([`crate::physics::light::self_shadow`], corrected; metres of the model, because
+/// what is in a crown grows with it).
 #[inline]
 pub fn own<C: CrownModel>(
     crown: &C,
     patch: &Patch,
     heading: &Heading<C::Aim>,
     azimuth: &Azimuth,
-    (receiver, angle): (&Receiver, f32),
-) -> (f32, f32) {
-    let Some(tree) = &receiver.tree else { return (1.0, 0.0) };
+    (receiver, toward): (&Receiver, &Toward),
+) -> Own {
+    let Some(tree) = &receiver.tree else { return Own { lit: 1.0, sent: 1.0, entry: 0.0 } };
     // Across the torus the point may lie near another image of its tree.
     let offset = [0, 1].map(|k| {
         let d = receiver.position[k] - tree.position[k];
@@ -318,12 +365,29 @@ pub fn own<C: CrownModel>(
     });
     let metres = metres.unwrap_or(0.0);
     let shade = crown.crown();
-    let through = shade.leaf_shadow * angle.sqrt() + (shade.extinction / tree.scale * angle * metres).sqrt();
-    ((-through).exp(), metres)
+    let angle = toward.angle;
+    let through =
+        (-(shade.leaf_shadow * angle.sqrt() + (shade.extinction / tree.scale * angle * metres).sqrt())).exp();
+    let corrected = |line: [f64; 2]| through * correction::at(line, receiver.height.into()) as f32;
+    Own { lit: corrected(toward.lit).min(1.0), sent: corrected(toward.sent), entry: metres }
 }
 
-/// The ray of light to a receiver, past its own tree, which it enters after `entry` m: others shadow it if their back lies
-/// nearer the sun than that (`shaders/frame/trees/zfield_shade.glsl`).
+/// What a crown stops of a ray of light before it has come down to `entry` m from its end: all that it stops where its back is nearer the
+/// sun than that, and of an even crown that the ray's end is in, 1 − (1 − α')^t with the part t of it that lies before
+/// (`shaders/frame/trees/zfield_shadow.frag`).
+#[inline]
+fn stopped(cast: &Cast, metres: impl Fn(f32) -> f32, entry: f32) -> f32 {
+    let (back, front) = (metres(cast.back), metres(cast.front));
+    if cast.alpha <= 0.0 || front <= entry {
+        0.0
+    } else if back >= entry {
+        cast.alpha
+    } else {
+        1.0 - (1.0 - cast.alpha.min(0.999)).powf((front - entry) / (front - back))
+    }
+}
+
+/// The ray of light to a receiver, past its own tree, which it enters after `entry` m: others shadow it from there on.
 #[inline]
 pub fn light<C: CrownModel, const M: usize>(
     crown: &C,
@@ -348,17 +412,18 @@ pub fn light<C: CrownModel, const M: usize>(
         }
         let Some(met) = at_tree(crown, heading, azimuth, tree, offset, receiver.z) else { return };
         let cast = crown.cast(&heading.aims[met.step as usize], met.a, met.b);
-        if cast.alpha <= 0.0 || (cast.back - met.depth) * met.metres <= entry {
+        let stopped = stopped(&cast, |depth| (depth - met.depth) * met.metres, entry);
+        if stopped <= 0.0 {
             return;
         }
-        light.sum += cast.alpha;
+        light.sum += stopped;
         for (a, q) in light.alone.iter_mut().zip(q) {
-            *a *= 1.0 - q * cast.alpha;
+            *a *= 1.0 - q * stopped;
         }
         match marks.get(tree.index) {
             Some(alpha) => {
-                light.overlap += alpha * cast.alpha;
-                let both = alpha + cast.alpha - alpha * cast.alpha;
+                light.overlap += alpha * stopped;
+                let both = alpha + stopped - alpha * stopped;
                 for (j, q) in light.joint.iter_mut().zip(q) {
                     // Where both factors are 0 the product with the view ray's is 0 anyway.
                     *j *= (1.0 - q * both) / (1.0 - q * alpha).max(1e-6);
@@ -366,7 +431,7 @@ pub fn light<C: CrownModel, const M: usize>(
             }
             None => {
                 for (j, q) in light.joint.iter_mut().zip(q) {
-                    *j *= 1.0 - q * cast.alpha;
+                    *j *= 1.0 - q * stopped;
                 }
             }
         }

@@ -34,11 +34,6 @@ pub use ssim::ssim_map;
 
 use crate::image::Layers;
 
-/// Rec. 709 luminance.
-pub(super) fn luminance(c: [f32; 3]) -> f64 {
-    0.2126 * f64::from(c[0]) + 0.7152 * f64::from(c[1]) + 0.0722 * f64::from(c[2])
-}
-
 /// Square root that keeps the sign.
 fn signed_root(x: f64) -> f64 {
     x.signum() * x.abs().sqrt()

@@ -1,8 +1,9 @@
 //! What an eye sees of the difference: FLIP (Andersson et al. 2020) and structural similarity, of images as they are displayed.
 
-use super::{Estimate, block_sums, estimate, luminance, ssim_map, variance};
+use super::{Estimate, block_sums, estimate, ssim_map, variance};
 use crate::image::Layers;
 use crate::measure::statistics::Random;
+use crate::physics::light::luminance;
 use crate::physics::tonemap::{srgb, tone_curve};
 
 /// FLIP raises colour differences to the power 0.7 (its q_c), so of noise alone this power of it grows with the variance.

@@ -2,7 +2,9 @@
 //
 // Every invocation lists the trees of its column of pixels; then the tile's list is shaded by all invocations in turn, so that
 // none waits for pixels that see no tree; then each puts its pixels together.
+#include "physics/hash.glsl"
 #include "physics/light.glsl"
+#include "physics/correction.glsl"
 #include "frame/trees/tiles/fetch.glsl"
 #include "physics/zfield.glsl"
 #include "physics/shadow.glsl"
@@ -88,9 +90,10 @@ Shown shade(uint rank, vec2 offset, out float depth) {
     // A texel spans crowns whose backs slope by about one: half a texel towards the sun, or neighbours shade each other's rims.
     ray.entry.z += 0.5 * v.cascade_texel[cascade] * ray.deeper;
     float phase_angle = angle_between(-t.centre, v.sun_direction), root = sqrt(phase_angle);
-    TreeLight light = TreeLight(t.sun, t.sky, t.mean_sun, t.mean_sky, t.mean_lit, t.own, kind.bark_ratio, kind.bare_below,
-                                plane.half_extent.z, t.hole, kind.leaf_shadow * root, kind.extinction * phase_angle / t.scale, toward,
-                                transfer_strength(root), t.cascade);
+    vec2 hole = unpackHalf2x16(t.hole_change), own = unpackHalf2x16(t.own_lit), lit = unpackHalf2x16(t.mean_lit_change);
+    TreeLight light = TreeLight(t.sun, hole.y, t.sky, t.mean_sun, t.mean_sky, lit.x, own.x, vec2(own.y, lit.y), kind.bark_ratio,
+                                kind.bare_below, plane.half_extent.z, hole.x, kind.leaf_shadow * root, kind.extinction * phase_angle / t.scale, toward,
+                                transfer_strength(root), t.cascade, caster_name(t.identity));
     TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, light, surface, at, to, layers, below, t.mip, magnified,
                                  s, found.z, ray, LightQuality(HAS_SUN, LIGHT_ITERATIONS, TRANSFER_BANDS));
 #ifdef LAYERS

@@ -1,0 +1,75 @@
+//! Corrections of a crown's laws ([`crate::physics::correction`]), by least squares.
+
+use super::least_squares;
+use crate::physics::correction::{Correction, TERMS};
+
+/// Sums of a correction's least squares, min Σ w (K law − truth)²/law: weighed as counts are, whose variance is their mean.
+#[derive(Clone, Copy, Default)]
+pub struct Fit {
+    h: [[f64; 2 * TERMS]; 2 * TERMS],
+    y: [f64; 2 * TERMS],
+}
+
+impl Fit {
+    /// Adds a sample at a height of scaled space, with a weight: what the law says, and what the mesh does.
+    pub fn add(
+        &mut self,
+        terms: &[f64; TERMS],
+        (strength, height, weight): (f64, f64, f64),
+        (law, truth): (f64, f64),
+    ) {
+        let x: [f64; 2 * TERMS] =
+            std::array::from_fn(|i| strength * terms[i % TERMS] * if i < TERMS { 1.0 } else { height });
+        for (i, xi) in x.iter().enumerate() {
+            // The derivative of (law (1 + x c) − truth)²/law.
+            self.y[i] += weight * xi * (truth - law);
+            for (j, xj) in x.iter().enumerate().take(i + 1) {
+                self.h[i][j] += weight * law * xi * xj;
+            }
+        }
+    }
+
+    /// Adds what another has summed up.
+    pub fn merge(&mut self, other: &Fit) {
+        self.y.iter_mut().zip(other.y).for_each(|(a, b)| *a += b);
+        self.h.iter_mut().flatten().zip(other.h.iter().flatten()).for_each(|(a, b)| *a += b);
+    }
+
+    /// The coefficients; none where there is nothing to fit to.
+    pub fn solve(mut self) -> Correction {
+        // Worth a hundred-thousandth of the samples: only what they cannot tell stays 0.
+        let ridge = 1e-5 * self.h[0][0];
+        (0..2 * TERMS).for_each(|i| self.h[i][i] += ridge);
+        let x = least_squares::solve(self.h, self.y, 2 * TERMS).unwrap_or([0.0; 2 * TERMS]);
+        let of = |first: usize| std::array::from_fn(|i| x[first + i] as f32);
+        Correction { middle: of(0), change: of(TERMS) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::correction::{at, terms};
+    use crate::physics::hash::Stream;
+
+    #[test]
+    fn what_was_corrected_is_found_again() {
+        let truth = Correction {
+            middle: [0.1, -0.2, 0.3, 0.05, -0.1, 0.2, -0.05, 0.1],
+            change: [0.05, 0.1, -0.1, 0.0, 0.1, -0.05, 0.02, 0.1],
+        };
+        let (mut stream, mut halves) = (Stream::new(3), [Fit::default(); 2]);
+        for k in 0..4000 {
+            let y = terms(stream.unit(), stream.unit(), 3.0 * stream.unit());
+            let (z, law) = (2.0 * stream.unit() - 1.0, stream.unit());
+            halves[k % 2].add(&y, (1.0, z, 1.0), (law, law * at(truth.line(&y, 1.0), z)));
+        }
+        let [mut fit, other] = halves;
+        fit.merge(&other);
+        let found = fit.solve();
+        let pairs = found.middle.iter().zip(truth.middle).chain(found.change.iter().zip(truth.change));
+        // The ridge holds back by about its own size over the least that any term explains.
+        assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 0.01), "{found:?}");
+        assert_eq!(Fit::default().solve(), Correction::default());
+    }
+}

@@ -1,0 +1,66 @@
+//! What the laws of a crown's light leave out, by the directions of viewer and sun and by height; twin of
+//! `shaders/physics/correction.glsl`.
+//!
+//! [`super::light::self_shadow`] and [`super::light::leaf_phase`] know a crown by four numbers. A real one is denser below than at
+//! its top, its leaves lie flatter there, and its far side is darker than any law of the distance and the phase angle says: in an oak, 4 % too
+//! few of what is seen are lit with the sun at 45°, 21 % with it at 20° behind the tree, and what lit leaves send is 13 % too much there. Held
+//! against rays through the mesh, in cells of view, sun and height that such laws were not fitted in, what is left of either has an
+//! rms of 6 % in an oak and 10 % in a pine; times
+//!
+//! K(z) = max(1 + s Σ_i (a_i + b_i z) Y_i, 0),  Y = 1, q, q², l_z, l_z², v_z, v_z q, l_z q,  q = √(α/π),
+//!
+//! with the phase angle α and z in [−1, 1] from the trunk's foot to the tree's top, 2 and 4 %. Without b, heights keep their errors:
+//! 2 and 10 %, and that is what makes dense forests wrong, of which only the tops are seen and lit. `bake` measures a and b of every
+//! mesh.
+
+/// Terms Y.
+pub const TERMS: usize = 8;
+
+/// a and b of a crown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Correction {
+    /// a: at the middle of the tree's height.
+    pub middle: [f32; TERMS],
+    /// b: change over half of it.
+    pub change: [f32; TERMS],
+}
+
+/// Y, of the cosines v_z and l_z of the zenith angles of viewer and sun (none below the horizon) and the phase angle, rad.
+pub fn terms(view: f64, sun: f64, angle: f64) -> [f64; TERMS] {
+    let (v, l, q) = (view.clamp(0.0, 1.0), sun.clamp(0.0, 1.0), (angle / std::f64::consts::PI).sqrt());
+    [1.0, q, q * q, l, l * l, v, v * q, l * q]
+}
+
+impl Correction {
+    /// Nothing is corrected: K is 1.
+    pub const NONE: Correction = Correction { middle: [0.0; TERMS], change: [0.0; TERMS] };
+
+    /// K as a line in z: its value at 0, and its slope.
+    pub fn line(&self, terms: &[f64; TERMS], strength: f64) -> [f64; 2] {
+        let sum = |c: &[f32; TERMS]| c.iter().zip(terms).map(|(c, y)| f64::from(*c) * y).sum::<f64>();
+        [1.0 + strength * sum(&self.middle), strength * sum(&self.change)]
+    }
+}
+
+/// K at a height.
+pub fn at([value, slope]: [f64; 2], z: f64) -> f64 {
+    (value + slope * z).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_corrected_without_coefficients_and_never_below_zero() {
+        let y = terms(0.3, 0.8, 1.0);
+        assert_eq!(Correction::NONE.line(&y, 1.0), [1.0, 0.0]);
+        let c = Correction { middle: [-0.5; TERMS], change: [1.0; TERMS] };
+        let line = c.line(&y, 0.5);
+        let sum: f64 = y.iter().sum();
+        assert!((line[0] - (1.0 - 0.25 * sum)).abs() < 1e-12 && (line[1] - 0.5 * sum).abs() < 1e-12);
+        assert_eq!(at(line, -9.0), 0.0);
+        // From under the ground nothing is known that the horizon does not know.
+        assert_eq!(terms(-0.5, 2.0, 1.0), terms(0.0, 1.0, 1.0));
+    }
+}
