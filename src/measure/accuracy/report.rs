@@ -3,10 +3,10 @@
 use plotters::prelude::*;
 
 use super::design::Part;
-use super::score::luminance;
 use super::{Accuracy, CellResult, Drawn, Score};
 use crate::measure::page::{head, table};
 use crate::measure::reflectance::Measured;
+use crate::physics::light::luminance;
 use crate::{Error, Result};
 
 /// Suns lower than this, degrees, are summed up apart: shadows are long and most crowns dark.

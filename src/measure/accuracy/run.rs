@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::design::{Cell, Forest};
-use super::score::{Lit, luminance, score};
+use super::score::{Lit, score};
 use super::{ACCURACY_SCHEMA_VERSION, Accuracy, CellResult, Drawn};
 use crate::bake::{Baked, Needs, cache, load_or_bake_scene};
 use crate::camera::Light;
@@ -15,6 +15,7 @@ use crate::measure::reflectance::{
     Measured, Method, Request as Patch, measure, measure_reference, patch_scene, sees,
 };
 use crate::measure::results::{BenchResult, DeviceIdentity};
+use crate::physics::light::luminance;
 use crate::plan::Drawing;
 use crate::reference::{self, Until};
 use crate::scene::{Albedo, Scene};

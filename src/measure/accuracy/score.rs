@@ -1,6 +1,7 @@
 //! How far what was drawn of a cell is from its reference, and which part of the model that comes from.
 
 use crate::measure::reflectance::Measured;
+use crate::physics::light::luminance;
 
 /// Views so near to the sun's direction, degrees, are the hotspot's: judged by themselves.
 pub const HOTSPOT: f64 = 5.0;
@@ -92,11 +93,6 @@ pub struct Lit {
     /// Whether what was drawn is the mean over all forests of its kind and not of the reference's own trees: what patches differ by is
     /// noise then.
     pub averages: bool,
-}
-
-/// Rec. 709.
-pub fn luminance([r, g, b]: [f64; 3]) -> f64 {
-    0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
 /// Angle between two directions by zenith angle and azimuth, degrees.
