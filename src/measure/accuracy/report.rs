@@ -14,7 +14,7 @@ pub const LOW_SUN: f64 = 20.0;
 /// Cells of which the page shows curves.
 const CURVES: usize = 24;
 
-/// Headings of [`rows`].
+/// Headings of [`row`].
 pub const HEADINGS: [&str; 11] = [
     "cell",
     "trees/m²",
