@@ -314,6 +314,8 @@ pub fn light(t: &ForestTables, theta_v: f64, theta_l: f64, phi: f64, x: f64) -> 
     let [w, leaf, bark, transfer] = pair(t, theta_v, theta_l, phi, x);
     let seen = x * secant(theta_v) * view(t, theta_v, x)[0];
     let layer = lit_of_seen(seen, (x * (secant(theta_v) + secant(theta_l)) * w).max(seen));
+    // Between nodes the product of two interpolated factors may be a little more than all.
+    let layer = layer.min(1.0 / (leaf + bark).max(1e-6));
     [layer * leaf, layer * bark, transfer]
 }
 

@@ -8,7 +8,7 @@ use crate::bake::file::{Fields, Format, load_or_build};
 use crate::bake::{CacheState, SpeciesBake};
 use crate::physics::tables::ForestTables;
 
-const FORMAT: Format = Format { magic: *b"CANOPYFT", version: 11, extension: "forest" };
+const FORMAT: Format = Format { magic: *b"CANOPYFT", version: 12, extension: "forest" };
 
 /// The tables of a species in a forest, from the cache if they are there, else measured and put there; `species` is asked for only
 /// then. With `None` for a cache nothing is read or written; `source` is the key of what the species is baked from
