@@ -4,6 +4,11 @@ use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+/// A line for whoever waits, on the standard error. Not `eprintln!`, which panics when no one listens any more.
+pub fn say(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
 /// Counts finished steps of one named job; safe to share between threads.
 pub struct Progress {
     bar: Option<indicatif::ProgressBar>,
@@ -62,9 +67,8 @@ impl Progress {
             if self.start.elapsed() > Duration::from_secs(1)
                 && self.decile.fetch_max(decile, Ordering::Relaxed) < decile
             {
-                // Not `eprintln!`, which panics when no one listens any more.
                 let comma = if note.is_empty() { "" } else { ", " };
-                let _ = writeln!(std::io::stderr(), "{label}: {} %{comma}{note}", decile * 10);
+                say(&format!("{label}: {} %{comma}{note}", decile * 10));
             }
         }
     }

@@ -30,8 +30,8 @@ impl Sphere {
             height: centre + radius,
             leaf_shadow: 0.0,
             extinction: 1.0,
-            lit: Correction::NONE,
-            sent: Correction::NONE,
+            lit: Correction::default(),
+            sent: Correction::default(),
         };
         Sphere(crown, LeafOptics { scattered: [0.12, 0.06], turning: 0.0, albedo: 0.18 })
     }
@@ -203,7 +203,7 @@ fn light_on_spheres_is_the_closed_form() {
 /// E and Γ_v of Poisson spheres: the more they are, the less of the sky each has. Visible ground that no disc covers is met by neither of two shadows, one of them straight down.
 #[test]
 fn sky_and_coverage_of_spheres_are_the_closed_form() {
-    // The sky is many suns: five angles would leave 58 degrees between two of them, and E 9 % off; scenes have twelve and more.
+    // The sky is many suns: five angles would leave 58 degrees between two of them, and E 9 % off; scenes have sixteen.
     let forest = ForestSettings { angles: 14, rays: 4096, ..SMALL };
     let t = &measure(&Sphere::new(3.0, 5.0), &forest, true).unwrap();
     let (n, m) = (t.angles as usize, t.densities as usize);

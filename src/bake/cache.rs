@@ -123,13 +123,12 @@ impl<'a> Source<'a> {
             |parts| {
                 let sent: Vec<f32> =
                     parts[0].as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-                let of = |first: usize| std::array::from_fn(|i| sent[first + i]);
+                let sent = Correction::from_coefficients(std::array::from_fn(|i| sent[i]));
                 let bands = parts[1..].chunks(band.len()).map(<[_]>::to_vec).collect();
-                Transfer { resolution, bands, sent: Correction { middle: of(0), change: of(TERMS) } }
+                Transfer { resolution, bands, sent }
             },
             |transfer, put| {
-                let Correction { middle, change } = transfer.sent;
-                put(&[middle, change].map(|c| c.map(f32::to_le_bytes).concat()).concat())?;
+                put(&transfer.sent.coefficients().map(f32::to_le_bytes).concat())?;
                 transfer.bands.iter().flatten().try_for_each(|l| put(l))
             },
             || bake_transfer(self.mesh, bake, bands, self.quiet),
@@ -235,7 +234,7 @@ fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {
         centre, half_width, half_height, reflected, slope, passed, bark_reflected, bark_share, leaf_shadow, extinction,
         r0, r1, r2, t0, t1, t2, b0, b1, b2, b.area, radius, base, height,
     ];
-    let corrections = [lit.middle, lit.change, sent.middle, sent.change];
+    let corrections = [lit, sent].map(|c| c.coefficients());
     let mut scalars = [0.0; SCALARS];
     scalars.iter_mut().zip(all.iter().chain(corrections.iter().flatten())).for_each(|(to, from)| *to = *from);
     scalars
@@ -258,8 +257,8 @@ fn decode(mut parts: Vec<Vec<u8>>, settings: &BakeSettings) -> SpeciesBake {
         centre, half_width, half_height, reflected, slope, passed, bark_reflected, bark_share, leaf_shadow, extinction,
         r0, r1, r2, t0, t1, t2, b0, b1, b2, area, radius, base, height, ..
     ] = x;
-    let of = |k: usize| std::array::from_fn(|i| x[SCALARS - 4 * TERMS + k * TERMS + i]);
-    let [lit, sent] = [0, 2].map(|k| Correction { middle: of(k), change: of(k + 1) });
+    let [lit, sent] = [SCALARS - 4 * TERMS, SCALARS - 2 * TERMS]
+        .map(|first| Correction::from_coefficients(std::array::from_fn(|i| x[first + i])));
     let frame = Frame { centre, half_width, half_height };
     SpeciesBake {
         views: ZField { n: settings.rings, resolution: settings.resolution, levels },

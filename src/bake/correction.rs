@@ -2,6 +2,35 @@
 
 use super::least_squares;
 use crate::physics::correction::{Correction, TERMS};
+use crate::physics::crown::Crown;
+use crate::physics::light;
+
+/// What a crown's laws send to a viewer of the sun's light, per irradiance, where it is lit: luminances.
+pub struct Law {
+    crown: Crown,
+    leaves: [f64; 2],
+    turning: f64,
+    bark_ratio: f64,
+}
+
+impl Law {
+    /// Of the reflectance and transmittance of [`super::SpeciesBake::crown_leaves`], the change of the first with the phase angle, 1/rad,
+    /// and the reflectance of bark.
+    pub fn new(crown: Crown, leaves: [f64; 2], turning: f64, bark: f64) -> Self {
+        Law { crown, leaves, turning, bark_ratio: bark / (leaves[0] + leaves[1]).max(1e-3) }
+    }
+
+    /// Of leaves, at a phase angle, rad.
+    pub fn phase(&self, angle: f64) -> f64 {
+        let turned = light::turned_reflectance(self.turning, angle);
+        light::leaf_phase(angle, self.leaves[0] * turned, self.leaves[1])
+    }
+
+    /// What is seen at a height of scaled space over leaves: bark under the crown.
+    pub fn colour(&self, height: f32) -> f64 {
+        1.0 + f64::from(self.crown.bark_share(height)) * (self.bark_ratio - 1.0)
+    }
+}
 
 /// Sums of a correction's least squares, min Σ w (K law − truth)²/law: weighed as counts are, whose variance is their mean.
 #[derive(Clone, Copy, Default)]
@@ -41,8 +70,7 @@ impl Fit {
         let ridge = 1e-5 * self.h[0][0];
         (0..2 * TERMS).for_each(|i| self.h[i][i] += ridge);
         let x = least_squares::solve(self.h, self.y, 2 * TERMS).unwrap_or([0.0; 2 * TERMS]);
-        let of = |first: usize| std::array::from_fn(|i| x[first + i] as f32);
-        Correction { middle: of(0), change: of(TERMS) }
+        Correction::from_coefficients(x.map(|x| x as f32))
     }
 }
 

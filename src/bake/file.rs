@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::CacheState;
 use crate::Result;
 use crate::files::Unfinished;
+use crate::progress::say;
 
 const HEADER: usize = 8 + 4 + 32;
 const CHECKSUM: usize = 32;
@@ -62,8 +63,7 @@ pub fn load_or_build<T>(
         Err(e) if e.kind() == io::ErrorKind::NotFound => CacheState::Baked,
         Err(e) => {
             if !quiet {
-                // Not `eprintln!`, which panics when no one listens any more.
-                let _ = writeln!(io::stderr(), "cache: {}: {e}; baking again", path.display());
+                say(&format!("cache: {}: {e}; baking again", path.display()));
             }
             CacheState::Rebuilt
         }
@@ -72,7 +72,7 @@ pub fn load_or_build<T>(
     if let Err(e) = write(dir, &path, &header, |put| encode(&built, put)) {
         static WARNED: AtomicBool = AtomicBool::new(false);
         if !quiet && !WARNED.swap(true, Ordering::Relaxed) {
-            let _ = writeln!(io::stderr(), "cache: cannot write to {}: {e}; going on without", dir.display());
+            say(&format!("cache: cannot write to {}: {e}; going on without", dir.display()));
         }
     }
     Ok((built, state))

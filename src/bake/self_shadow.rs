@@ -25,7 +25,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::correction::Fit;
+use super::correction::{Fit, Law};
 use super::surface::{Caster, Surface};
 use super::{SpeciesBake, Turned};
 use crate::Result;
@@ -135,16 +135,14 @@ fn corrections(
     let [leaf, passed, bark] = matter.luminances;
     let reflected = f64::from(turned.reflected) * leaf + f64::from(turned.bark_reflected) * bark;
     let passed = f64::from(turned.passed) * passed;
-    let bark_ratio = bark / (reflected + passed).max(1e-3);
     // Of all of a crown only the base matters here.
     let crown = Crown { frame, base: matter.base, ..Crown::default() };
+    let law = Law::new(crown, [reflected, passed], turned.slope_of().into(), bark);
     let mut fits = [Fit::default(); 2];
     for s in samples {
         let terms = correction::terms(s.up[0], s.up[1], s.angle);
         let lit = light::self_shadow(s.angle, s.metres, c, tau);
-        let turned = light::turned_reflectance(f64::from(turned.slope_of()), s.angle);
-        let colour = 1.0 + f64::from(crown.bark_share(s.height as f32)) * (bark_ratio - 1.0);
-        let sent = lit * colour * light::leaf_phase(s.angle, reflected * turned, passed);
+        let sent = lit * law.colour(s.height as f32) * law.phase(s.angle);
         let truth = f64::from(u8::from(s.lit));
         fits[0].add(&terms, (transfer::strength(s.angle), s.height, 1.0), (lit, truth));
         fits[1].add(&terms, (1.0, s.height, 1.0), (sent, truth * s.sent));

@@ -13,7 +13,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::correction::Fit;
+use super::correction::{Fit, Law};
 use super::raster::{NO_FACE, Raster, SUBSAMPLES, View};
 use super::surface::{Caster, Surface};
 use super::tables::{CrownModel, FieldAim, FieldCrown};
@@ -145,10 +145,8 @@ struct Scatter {
     /// Of each face, from the side that is lit and through it, times π.
     faces: Vec<[f32; 2]>,
     normals: Vec<Vec3>,
-    /// Of the law's crown: reflectance and transmittance.
-    crown: [f64; 2],
-    /// The law's bark under the crown, over the crown's.
-    bark_ratio: f64,
+    /// What the renderer has for it without transfer.
+    law: Law,
 }
 
 impl Scatter {
@@ -159,7 +157,7 @@ impl Scatter {
         let of = |material: u32| {
             if leafless || mesh.materials[material as usize].foliage { leaf } else { bark }
         };
-        let crown = bake.crown_leaves().map(luminance);
+        let leaves = bake.crown_leaves().map(luminance);
         Scatter {
             faces: surface.faces.iter().map(|f| of(f.material)).collect(),
             normals: surface
@@ -170,8 +168,12 @@ impl Scatter {
                     (b - a).cross(c - a).normalize_or_zero()
                 })
                 .collect(),
-            crown,
-            bark_ratio: luminance(bake.bark_reflectance) / (crown[0] + crown[1]).max(1e-3),
+            law: Law::new(
+                bake.crown,
+                leaves,
+                bake.turned.slope_of().into(),
+                luminance(bake.bark_reflectance),
+            ),
         }
     }
 }
@@ -217,10 +219,8 @@ fn show(
 ) -> Vec<Option<Shown>> {
     let law: [(f64, f64, [f64; 2]); LIGHTS] = std::array::from_fn(|k| {
         let angle = light::angle_between(eye.as_dvec3().into(), suns[k].to.as_dvec3().into());
-        let turned = light::turned_reflectance(f64::from(bake.turned.slope_of()), angle);
         let terms = correction::terms(eye.z.into(), suns[k].to.z.into(), angle);
-        let phase = light::leaf_phase(angle, scatter.crown[0] * turned, scatter.crown[1]);
-        (angle, phase, bake.crown.sent.line(&terms, 1.0))
+        (angle, scatter.law.phase(angle), bake.crown.sent.line(&terms, 1.0))
     });
     let [c, tau] = [bake.crown.leaf_shadow, bake.crown.extinction].map(f64::from);
     let side = (raster.size / SUBSAMPLES) as usize;
@@ -253,7 +253,7 @@ fn show(
         }
         // The renderer knows the texel's mean depth.
         middle /= seen;
-        let colour = 1.0 + f64::from(bake.crown.bark_share(middle.z)) * (scatter.bark_ratio - 1.0);
+        let colour = scatter.law.colour(middle.z);
         let plain = std::array::from_fn(|k| {
             let (angle, phase, _) = law[k];
             let way = f64::from(suns[k].way(field, middle));
@@ -293,7 +293,7 @@ fn texels(
         None => ([0.0; 8], 0.0),
     };
     let texels: Vec<([f64; 8], f32)> = shown.iter().map(coefficients).collect();
-    let amiss = amiss(&shown, &texels, eye, (suns, &angles));
+    let amiss = amiss(&shown, &texels, eye, (suns, &angles, &strength));
     (texels, amiss)
 }
 
@@ -304,7 +304,7 @@ fn amiss(
     shown: &[Option<Shown>],
     texels: &[([f64; 8], f32)],
     eye: Vec3,
-    (suns, angles): (&[Sun], &[f64; LIGHTS]),
+    (suns, angles, strength): (&[Sun], &[f64; LIGHTS], &[f64; LIGHTS]),
 ) -> Fit {
     let terms: [_; LIGHTS] =
         std::array::from_fn(|k| correction::terms(eye.z.into(), suns[k].to.z.into(), angles[k]));
@@ -313,7 +313,7 @@ fn amiss(
         let Some(s) = s else { continue };
         for (k, sun) in suns.iter().enumerate() {
             let sum: f64 = x.iter().zip(sun.terms).map(|(x, y)| x * y).sum();
-            let law = f64::from(s.plain[k]) * (1.0 + transfer::strength(angles[k]) * sum).max(0.0);
+            let law = f64::from(s.plain[k]) * (1.0 + strength[k] * sum).max(0.0);
             fit.add(&terms[k], (1.0, s.height, f64::from(*opacity)), (law, s.truth[k].into()));
         }
     }

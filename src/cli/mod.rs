@@ -16,7 +16,6 @@ mod render;
 mod sweep;
 mod tree;
 
-use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -88,8 +87,7 @@ pub fn run() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
-            // Not `eprintln!`, which panics when no one listens any more.
-            let _ = writeln!(std::io::stderr(), "error: {e}");
+            canopy::progress::say(&format!("error: {e}"));
             ExitCode::from(e.exit_code())
         }
     }

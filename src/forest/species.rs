@@ -219,7 +219,7 @@ fn mean_squared_scale(species: &Species) -> f64 {
 
 /// A correction's coefficients as the table has them.
 fn coefficients(c: &Correction) -> [[f32; 4]; 4] {
-    let all: Vec<f32> = c.middle.iter().chain(&c.change).copied().collect();
+    let all = c.coefficients();
     std::array::from_fn(|k| std::array::from_fn(|i| all[4 * k + i]))
 }
 

@@ -278,17 +278,20 @@ fn direction([zenith, azimuth]: [f64; 2]) -> [f64; 3] {
     [t.sin() * a.sin(), -t.sin() * a.cos(), t.cos()]
 }
 
+/// Cosine of the angle from a view to a direction towards the sun's side at a zenith angle, degrees: the sun, or a slope's normal.
+pub(super) fn cosine(view: [f64; 2], zenith: f64) -> f64 {
+    let (v, z) = (direction(view), zenith.to_radians());
+    v[2] * z.cos() - v[1] * z.sin()
+}
+
 /// Whether a slope shows its face to a view direction, by five degrees at least.
-pub fn sees([zenith, azimuth]: [f64; 2], slope: f64) -> bool {
-    let (z, a, s) = (zenith.to_radians(), azimuth.to_radians(), slope.to_radians());
-    z.sin() * a.cos() * s.sin() + z.cos() * s.cos() > 5f64.to_radians().sin()
+pub fn sees(view: [f64; 2], slope: f64) -> bool {
+    cosine(view, slope) > 5f64.to_radians().sin()
 }
 
 /// How far from its centre the image of a patch shows the ground, m: half its side over the cosine to the ground's normal.
 fn shown(view: [f64; 2], slope: f64, side: f64) -> f64 {
-    let (v, s) = (direction(view), slope.to_radians());
-    let cosine = v[2] * s.cos() - v[1] * s.sin();
-    side * (0.5 / cosine.max(0.1) + 0.1)
+    side * (0.5 / cosine(view, slope).max(0.1) + 0.1)
 }
 
 /// The viewer of a patch.

@@ -16,7 +16,7 @@
 /// Terms Y.
 pub const TERMS: usize = 8;
 
-/// a and b of a crown.
+/// a and b of a crown; by default nothing is corrected, K is 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Correction {
     /// a: at the middle of the tree's height.
@@ -32,8 +32,16 @@ pub fn terms(view: f64, sun: f64, angle: f64) -> [f64; TERMS] {
 }
 
 impl Correction {
-    /// Nothing is corrected: K is 1.
-    pub const NONE: Correction = Correction { middle: [0.0; TERMS], change: [0.0; TERMS] };
+    /// Of all coefficients, a before b: what is stored, sent to shaders and solved for.
+    pub fn from_coefficients(all: [f32; 2 * TERMS]) -> Self {
+        let of = |first: usize| std::array::from_fn(|i| all[first + i]);
+        Correction { middle: of(0), change: of(TERMS) }
+    }
+
+    /// The reverse.
+    pub fn coefficients(&self) -> [f32; 2 * TERMS] {
+        std::array::from_fn(|i| if i < TERMS { self.middle[i] } else { self.change[i - TERMS] })
+    }
 
     /// K as a line in z: its value at 0, and its slope.
     pub fn line(&self, terms: &[f64; TERMS], strength: f64) -> [f64; 2] {
@@ -54,7 +62,7 @@ mod tests {
     #[test]
     fn nothing_is_corrected_without_coefficients_and_never_below_zero() {
         let y = terms(0.3, 0.8, 1.0);
-        assert_eq!(Correction::NONE.line(&y, 1.0), [1.0, 0.0]);
+        assert_eq!(Correction::default().line(&y, 1.0), [1.0, 0.0]);
         let c = Correction { middle: [-0.5; TERMS], change: [1.0; TERMS] };
         let line = c.line(&y, 0.5);
         let sum: f64 = y.iter().sum();

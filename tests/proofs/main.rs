@@ -19,6 +19,7 @@ mod soak;
 use std::path::PathBuf;
 
 use canopy::bake::{Baked, Needs, load_or_bake_scene};
+use canopy::physics::light::luminance;
 use canopy::scene::{self, Scene};
 
 /// Where proofs leave what they made.
@@ -47,9 +48,4 @@ fn oaks(density: f64, more: &str) -> (Scene, Vec<Baked>) {
 fn bake(scene: &Scene) -> Vec<Baked> {
     let cache = device::folder().join("bakes");
     load_or_bake_scene(scene, Needs::ALL, Some(&cache), false).unwrap().into_iter().map(|(b, _)| b).collect()
-}
-
-/// Luminance of a linear colour.
-fn luminance(c: [f64; 3]) -> f64 {
-    0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
 }

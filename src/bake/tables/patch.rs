@@ -187,7 +187,6 @@ impl Patch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::correction::Correction;
     use crate::physics::crown::Frame;
 
     fn forest(poisson: bool) -> ForestSettings {
@@ -199,21 +198,22 @@ mod tests {
         }
     }
 
-    const CROWN: Crown = Crown {
-        frame: Frame { centre: 5.0, half_width: 4.0, half_height: 5.0 },
-        radius: 3.0,
-        base: 2.0,
-        height: 10.0,
-        leaf_shadow: 0.0,
-        extinction: 1.0,
-        lit: Correction::NONE,
-        sent: Correction::NONE,
-    };
+    fn crown() -> Crown {
+        Crown {
+            frame: Frame { centre: 5.0, half_width: 4.0, half_height: 5.0 },
+            radius: 3.0,
+            base: 2.0,
+            height: 10.0,
+            leaf_shadow: 0.0,
+            extinction: 1.0,
+            ..Crown::default()
+        }
+    }
 
     #[test]
     fn patches_have_the_density_of_the_pattern() {
         for poisson in [false, true] {
-            let patches = patches(&CROWN, &forest(poisson), 16);
+            let patches = patches(&crown(), &forest(poisson), 16);
             let trees: usize = patches.iter().map(|p| p.trees.len()).sum();
             let area: f64 = patches.iter().map(|p| f64::from(p.side).powi(2)).sum();
             let ratio = trees as f64 / area / 0.03;
@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn tiles_keep_their_distance_across_the_torus() {
-        let patch = &patches(&CROWN, &forest(false), 1)[0];
+        let patch = &patches(&crown(), &forest(false), 1)[0];
         let least = Pattern::new(TILE_POINTS, SEED).distance as f32 * patch.side / TILES as f32;
         for a in &patch.trees {
             let nearest = patch.trees.iter().filter(|b| b.index != a.index).map(|b| {
@@ -241,7 +241,7 @@ mod tests {
     /// Every tree near a segment is met once an image, against all images within three tori.
     #[test]
     fn segments_meet_every_tree_near_them() {
-        let patch = &patches(&CROWN, &forest(true), 1)[0];
+        let patch = &patches(&crown(), &forest(true), 1)[0];
         let mut stream = Stream::new(5);
         for k in 0..200 {
             let angle = stream.unit() as f32 * std::f32::consts::TAU;

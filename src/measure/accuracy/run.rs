@@ -14,7 +14,7 @@ use crate::measure::host::Host;
 use crate::measure::reflectance::{
     Measured, Method, Request as Patch, measure, measure_reference, patch_scene, sees,
 };
-use crate::measure::results::{BenchResult, DeviceIdentity};
+use crate::measure::results::{BenchResult, DeviceIdentity, SceneIdentity};
 use crate::physics::light::luminance;
 use crate::plan::Drawing;
 use crate::reference::{self, Until};
@@ -22,7 +22,7 @@ use crate::scene::{Albedo, Scene};
 use crate::{Error, Result};
 
 /// Raised when cells of the same name are measured in another way.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// View zenith angles in the plane of the sun, degrees; negative on the side away from it.
 const ALONG: [f64; 11] = [-75.0, -60.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
 /// View zenith angles across it.
@@ -93,19 +93,19 @@ fn views(cell: &Cell) -> Vec<[f64; 2]> {
 /// [`Error::Io`]; [`Error::Device`]; [`Error::Usage`] for a scene that cannot be traced or drawn.
 pub fn run(gpu: &Gpu, request: &Request, folder: &Path) -> Result<Accuracy> {
     let (part, parts) = request.shard;
-    let own: Vec<&Cell> =
-        request.cells.iter().enumerate().filter(|(k, _)| k % parts == part - 1).map(|(_, c)| c).collect();
+    let all: Vec<Work> =
+        request.cells.iter().map(|c| Work::new(request, c, folder)).collect::<Result<_>>()?;
+    let own: Vec<&Work> = all.iter().skip(part - 1).step_by(parts).collect();
     let (begun, mut worked) = (Instant::now(), 0);
     for (k, cell) in own.iter().enumerate() {
         let before = begun.elapsed();
-        let cell = Work::new(request, cell, folder)?;
         let traced = cell.trace()?;
         let drawn = cell.draw(gpu)?;
         worked += usize::from(traced || drawn > 0);
         if !request.quiet && (traced || drawn > 0) {
             let took = begun.elapsed() - before;
             let left = begun.elapsed().mul_f64((own.len() - k - 1) as f64 / worked as f64);
-            eprintln(&format!(
+            crate::progress::say(&format!(
                 "[{}/{}] {}: {:.0} s, at most {:.0} min left",
                 k + 1,
                 own.len(),
@@ -115,23 +115,16 @@ pub fn run(gpu: &Gpu, request: &Request, folder: &Path) -> Result<Accuracy> {
             ));
         }
     }
-    judge(gpu, request, folder)
-}
-
-/// A line for whoever waits. Not `eprintln!`, which panics when no one listens any more.
-fn eprintln(line: &str) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stderr(), "{line}");
+    judge(gpu, request, &all)
 }
 
 /// Judges all cells of the design that a folder has.
-fn judge(gpu: &Gpu, request: &Request, folder: &Path) -> Result<Accuracy> {
+fn judge(gpu: &Gpu, request: &Request, all: &[Work]) -> Result<Accuracy> {
     let (mut cells, mut missing) = (Vec::new(), Vec::new());
-    for cell in request.cells {
-        let work = Work::new(request, cell, folder)?;
+    for work in all {
         let drawn: Option<Vec<Drawn>> = request.from.iter().map(|f| work.kept_drawing(*f)).collect();
         let (Some(reference), Some(drawn)) = (work.kept_reference(), drawn) else {
-            missing.push(cell.name.clone());
+            missing.push(work.cell.name.clone());
             continue;
         };
         let judged = |(d, from): (Drawn, &From)| {
@@ -140,7 +133,7 @@ fn judge(gpu: &Gpu, request: &Request, folder: &Path) -> Result<Accuracy> {
             (d, score)
         };
         let drawn = drawn.into_iter().zip(request.from).map(judged).collect();
-        cells.push(CellResult { cell: cell.clone(), reference, drawn });
+        cells.push(CellResult { cell: work.cell.clone(), reference, drawn });
     }
     let settings = request.forests.first().map(|f| f.scene.settings.clone()).unwrap_or_default();
     Ok(Accuracy {
@@ -159,6 +152,8 @@ struct Work<'a> {
     request: &'a Request<'a>,
     cell: &'a Cell,
     scene: Scene,
+    /// The scene of its patches.
+    patch: Scene,
     densities: Vec<f64>,
     views: Vec<[f64; 2]>,
     lit: Lit,
@@ -183,15 +178,10 @@ impl<'a> Work<'a> {
         let lit = |k: usize| f64::from(albedo[k]) * light.sun[k] * facing / std::f64::consts::PI;
         let lit = Lit { sun_zenith, ground: luminance([0, 1, 2].map(lit)), averages: false };
         let views = views(cell);
-        let models: Vec<_> = scene
-            .species
-            .iter()
-            .map(|s| (s.scale, crate::files::digest(bytemuck::cast_slice(&s.mesh.positions))))
-            .collect();
-        let what = (VERSION, cell, &views, &models, (&scene.sky, scene.seed, scene.sun.irradiance), albedo);
+        let what = (VERSION, cell, &views, SceneIdentity::new(&patch), albedo);
         let how = (request.method, format!("{:?}", request.until));
         let key = crate::files::digest(format!("{what:?} {how:?}").as_bytes())[..16].to_string();
-        Ok(Work { request, cell, scene, densities, views, lit, key, folder: folder.join("cells") })
+        Ok(Work { request, cell, scene, patch, densities, views, lit, key, folder: folder.join("cells") })
     }
 
     fn reference_file(&self) -> PathBuf {
@@ -250,9 +240,8 @@ impl<'a> Work<'a> {
         if wanted.is_empty() {
             return Ok(0);
         }
-        let patch = patch_scene(&self.scene, &self.densities, self.lit.sun_zenith, self.cell.slope)?;
         let baked =
-            load_or_bake_scene(&patch, Needs::ALL, cache::default_dir().as_deref(), self.request.quiet)?;
+            load_or_bake_scene(&self.patch, Needs::ALL, cache::default_dir().as_deref(), self.request.quiet)?;
         let baked: Vec<Baked> = baked.into_iter().map(|b| b.0).collect();
         let camera = self.scene.camera(None)?;
         for from in &wanted {

@@ -1,6 +1,6 @@
 //! How far what was drawn of a cell is from its reference, and which part of the model that comes from.
 
-use crate::measure::reflectance::Measured;
+use crate::measure::reflectance::{Measured, cosine};
 use crate::physics::light::luminance;
 
 /// Views so near to the sun's direction, degrees, are the hotspot's: judged by themselves.
@@ -95,12 +95,6 @@ pub struct Lit {
     pub averages: bool,
 }
 
-/// Angle between two directions by zenith angle and azimuth, degrees.
-fn angle([z, a]: [f64; 2], sun_zenith: f64) -> f64 {
-    let ([z, a], s) = ([z, a].map(f64::to_radians), sun_zenith.to_radians());
-    (z.sin() * a.cos() * s.sin() + z.cos() * s.cos()).clamp(-1.0, 1.0).acos().to_degrees()
-}
-
 /// An error and the reference's standard error there.
 type Sample = ([f64; 2], f64, f64);
 
@@ -147,7 +141,7 @@ pub fn score(reference: &[Measured], drawn: &[Measured], lit: &Lit) -> Score {
         let noise = luminance(if lit.averages { r.stderr } else { r.noise }) / truth;
         let of = |a: [f64; 3], b: [f64; 3]| (r.view, (luminance(a) - luminance(b)) / truth, noise);
         let sample = of(d.radiance(), r.radiance());
-        if angle(r.view, lit.sun_zenith) < HOTSPOT {
+        if cosine(r.view, lit.sun_zenith) > HOTSPOT.to_radians().cos() {
             hot.push(sample);
             continue;
         }

@@ -1,7 +1,6 @@
 //! Measures settings one after the other, keeps what was measured, and goes on where it stopped.
 
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -111,8 +110,7 @@ pub fn sweep(gpu: &Gpu, request: &Request, folder: &Path, from: &[PathBuf]) -> R
             }
             let point = runner.measure(setting, &pictures)?;
             if !request.quiet {
-                // Not `eprintln!`, which panics when no one listens any more.
-                let _ = writeln!(std::io::stderr(), "{}/{} {}", at + 1, all.len(), line(&point));
+                crate::progress::say(&format!("{}/{} {}", at + 1, all.len(), line(&point)));
             }
             result.points.push(point);
             result.write(&file)?;
