@@ -89,7 +89,6 @@ struct Species {
     float leaf_shadow;                // c of the crown's self-shadow, 1/sqrt(rad)
     vec3 albedo;                      // of what is seen of a crown, for the sky's light
     float turning;                    // change of the reflectance with the phase angle, 1/rad
-    vec2 sky;                         // factor of the sky's light on a crown from the side, and its change with the cosine of the view's zenith angle
     float hole;                       // 1 / squared radius of the hole around a tree, over the density: BN12 eq. 9
     vec4 lit[4];                      // correction of the share of a crown that is lit: two at the middle of the tree, two of their change
     vec4 sent[4];                     // correction of the sunlight that it sends

@@ -55,9 +55,11 @@ uint lookup(vec3 w, out vec2 weights) {
 // lit.
 float average_light(inout Tree t, Species kind, vec3 to_camera, vec3 ground, float density, float nu) {
     float x = density * kind.mean_area;
-    TableForest f = table_forest(pair_table, view_table, to_camera, view.v.sun_direction, ground, kind.vertical_scale, x,
-                                 min(x, kind.max_thickness), kind.max_thickness, float(t.species), TABLE_ANGLES,
-                                 TABLE_DENSITIES, PAIR_TABLES);
+    float species = float(t.species);
+    TableSlope slope = table_slope(view_table, to_camera, view.v.sun_direction, ground, kind.vertical_scale, species, TABLE_ANGLES,
+                                   TABLE_DENSITIES, PAIR_TABLES);
+    TableForest f = table_forest(pair_table, view_table, slope, x, TableKnown(x, x, x), kind.max_thickness, species, TABLE_ANGLES,
+                                 TABLE_DENSITIES, PAIR_TABLES, false);
     float lit = nu * sun_facing(view.v.sun_direction, ground);
     t.mean_sun = (lit * f.transfer) * t.sun * (f.sun.x + f.sun.y * kind.bark_ratio);
     t.mean_sky = nu * t.sky * (f.sky.x + f.sky.y * kind.bark_ratio);
@@ -118,8 +120,10 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     t.hole_change = packHalf2x16(vec2(density * kind.hole, sent.y / middle));
     t.own_lit = packHalf2x16(vec2(1.0 - nu, lit.x));
     t.mean_lit_change = packHalf2x16(vec2(mean_lit, lit.y));
-    // From above more of the leaves' upper sides is seen, which the sky lights. The tables' average knows.
-    t.sky *= max(kind.sky.x + kind.sky.y * to_camera.z, 0.0);
+    // What the hole leaves of it, brought to what is seen of the tables' forest along this direction.
+    TableAngles level = table_angles(to_camera, to_camera, vec3(0.0, 0.0, 1.0), kind.vertical_scale);
+    t.sky *= table_ground(view_table, table_zenith(level.v, TABLE_ANGLES), table_density(density * kind.mean_area, kind.max_thickness, TABLE_DENSITIES),
+                          float(t.species), TABLE_ANGLES, TABLE_DENSITIES).z;
     t.cascade = cascade_at(v.cascade_far, v.cascade_count, distance);
     return t;
 }

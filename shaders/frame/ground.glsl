@@ -67,8 +67,8 @@ GroundLight ground_light(GroundPoint at, vec3 n) {
     GroundLight g;
     g.coverage = mix(expected, c.channels[0].x, c.resolved);
     float lit = HAS_SUN ? mix(shadow_maps(at.position, n, cosine, distance), ground_lit, nu) : 0.0;
-    float contrast = mix(ground_contrast(g.coverage, expected, view.v.ground_contrast),
-                         ground_contrast(at.paths.w, expected, view.v.ground_contrast), nu);
+    // Around the mean of the ground that is seen, so that light is the same at every distance.
+    float contrast = mix(ground_contrast(g.coverage, at.paths.w, view.v.ground_contrast), 1.0, nu);
     float open = open_ground(thickness * at.paths.x, at.paths.x / max(at.paths.y, 1e-9), g.coverage, expected);
     vec3 sun = reflectance * (cosine * lit / PI) * view.v.sun_irradiance;
     vec3 sky = reflectance * (0.5 * (1.0 + n.z) * exp(-thickness * at.vertical.x) * contrast) * view.v.sky_radiance;

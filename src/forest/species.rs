@@ -259,7 +259,6 @@ fn rows(
             extinction: crown.extinction,
             leaf_shadow: crown.leaf_shadow,
             albedo: bake.sky_albedo(),
-            sky: tables.sky,
             turning: bake.turned.slope_of(),
             lit: coefficients(&crown.lit),
             sent: coefficients(&bake.sent()),

@@ -12,8 +12,8 @@ use crate::{Error, Result};
 pub struct TableData {
     /// (W, T of leaves, T of bark, M): azimuth, light zenith, then view zenith within density within species.
     pub pairs: Image,
-    /// (V, E of leaves, E of bark, coverage at visible ground) by view zenith and density, and in the last column
-    /// (D, C); a layer a species.
+    /// (V, E of leaves, E of bark, coverage at visible ground) by view zenith and density, and beside them (D_v, C, s); a layer a
+    /// species.
     pub views: Image,
     /// Nodes of each angle.
     pub angles: u32,
@@ -33,7 +33,7 @@ impl TableData {
         tables: &[&ForestTables],
     ) -> Result<Self> {
         let (n, m) = tables.first().map_or((1, 1), |t| (t.angles, t.densities));
-        let fits = views.size == [n + 1, m] && views.layers as usize == tables.len();
+        let fits = views.size == [2 * n, m] && views.layers as usize == tables.len();
         if !fits || tables.iter().any(|t| (t.angles, t.densities) != (n, m)) {
             return Err(Error::Usage("tables of species differ in their numbers of nodes".into()));
         }
@@ -55,9 +55,11 @@ impl TableData {
         let views = gpu.image(views)?;
         let mut texels = Vec::new();
         for t in tables {
-            for (row, [d, c]) in t.view.chunks_exact(n as usize).zip(&t.ground) {
+            let n = n as usize;
+            let skies = t.seen_sky.chunks_exact(n).zip(t.near_sky.chunks_exact(n));
+            for ((row, (seen, near)), [_, c]) in t.view.chunks_exact(n).zip(skies).zip(&t.ground) {
                 texels.extend(row.iter().flatten().map(|v| half(*v)));
-                texels.extend([half(*d), half(*c), 0, 0]);
+                texels.extend(seen.iter().zip(near).flat_map(|(d, s)| [half(*d), half(*c), half(*s), 0]));
             }
         }
         gpu.upload_image(&views, 0, 0, count, bytemuck::cast_slice(&texels))?;

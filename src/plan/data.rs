@@ -24,7 +24,7 @@ pub const QUAD_INDEX_BYTES: u64 = 24;
 pub fn tables(species: u32, angles: u32, densities: u32) -> (VolumeDesc, ImageDesc<'static>) {
     let size = [angles, angles, species * angles * densities];
     let pairs = VolumeDesc { name: resource::PAIR_TABLES, format: HALVES, size };
-    let views = ImageDesc::plain(resource::VIEW_TABLES, HALVES, [angles + 1, densities]);
+    let views = ImageDesc::plain(resource::VIEW_TABLES, HALVES, [2 * angles, densities]);
     (pairs, ImageDesc { layers: species, ..views })
 }
 

@@ -84,10 +84,9 @@ fn oracle(
 ) -> [[f64; 4]; 3] {
     let l = sun_direction(&scene.sun);
     let level = density * f64::from(row.mean_area);
-    let f = tables::forest(t, v, l, n, level, level);
+    let f = tables::forest(t, v, l, n, level, tables::Known::own(level));
     let (open, joint) = ((-f.seen).exp(), (-f.joint).exp());
-    let ([leaf, bark], [sky_leaf, sky_bark], seen_coverage) = (f.sun, f.sky, f.coverage);
-    let [sky, coverage] = tables::ground(t, level);
+    let ([leaf, bark], [sky_leaf, sky_bark], [sky, _]) = (f.sun, f.sky, f.ground);
     let trees = 1.0 - open;
     let facing = tables::sun_facing(l, n);
     let lit = facing * (leaf + bark);
@@ -99,7 +98,6 @@ fn oracle(
         f64::from(scene.settings.hotspot_amplitude),
         f64::from(scene.settings.hotspot_width),
     );
-    let contrast = light::ground_contrast(seen_coverage, coverage, f64::from(scene.settings.ground_contrast));
     let (mut from_sun, mut from_sky) = ([0.0; 4], [0.0; 4]);
     for c in 0..3 {
         let (r, t, b) =
@@ -109,7 +107,7 @@ fn oracle(
         from_sun[c] =
             trees * facing * f.transfer * full * (leaf + b * bark) + joint * ALBEDO[c] * cosine / PI * E[c];
         let leaves = 0.25 * (1.0 + n[2]) * f64::from(row.albedo[c]) * (sky_leaf + b * sky_bark);
-        from_sky[c] = SKY[c] * (trees * leaves + open * ALBEDO[c] * 0.5 * (1.0 + n[2]) * sky * contrast);
+        from_sky[c] = SKY[c] * (trees * leaves + open * ALBEDO[c] * 0.5 * (1.0 + n[2]) * sky);
     }
     [[joint, open - joint, trees * lit, trees * (1.0 - lit)], from_sun, from_sky]
 }
@@ -198,12 +196,13 @@ fn mixed(
     v: [f64; 3],
 ) -> [f64; 4] {
     let (l, up) = (sun_direction(&scene.sun), [0.0, 0.0, 1.0]);
-    let areas: Vec<f64> = rows.iter().map(|r| f64::from(r.mean_area)).collect();
-    let x: Vec<f64> = densities.iter().zip(&areas).map(|(d, a)| d * a).collect();
+    let x: Vec<f64> = densities.iter().zip(rows).map(|(d, r)| d * f64::from(r.mean_area)).collect();
+    let alone: Vec<[f64; 2]> = tables.iter().map(|t| tables::alone(t, v, l, up)).collect();
+    let listed: Vec<bool> = rows.iter().map(|r| r.listed_density > 0.0).collect();
     let total: f64 = x.iter().sum();
     let [mut seen, mut joint, mut lit] = [0.0; 3];
     for (k, t) in tables.iter().enumerate() {
-        let f = tables::forest(t, v, l, up, total, tables::known_thickness(k, &x, &areas));
+        let f = tables::forest(t, v, l, up, total, tables::Known::in_mix(k, &x, &alone, &listed));
         let share = x[k] / total;
         seen += share * f.seen;
         joint += share * f.joint;

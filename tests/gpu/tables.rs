@@ -171,13 +171,14 @@ fn random(seed: u32, (n, m): (u32, u32), max_thickness: f32) -> ForestTables {
         area: 10.0,
         vertical_scale: 1.0,
         hole: 1.0,
-        sky: [1.0, 0.0],
         pair: (0..pairs).map(|_| [0; 4].map(|_| value())).collect(),
         pair_stderr: Vec::new(),
         view: (0..views).map(|_| [0; 4].map(|_| value())).collect(),
         view_stderr: Vec::new(),
         ground: (0..m).map(|_| [0; 2].map(|_| value())).collect(),
         ground_stderr: Vec::new(),
+        seen_sky: (0..views).map(|_| value()).collect(),
+        near_sky: (0..views).map(|_| value()).collect(),
     }
 }
 
@@ -232,7 +233,11 @@ fn lookups_are_those_of_the_oracle_within_half_floats_and_filters() {
         for (&(v, l, phi, x, s), got) in cases.iter().zip(&found) {
             let t = &all[s];
             let [pair, view, ground] = got.map(|g| g.map(f64::from));
-            let (p, w, g) = (tables::pair(t, v, l, phi, x), tables::view(t, v, x), tables::ground(t, x));
+            let (p, w, g) = (
+                tables::pair(t, v, l, phi, x),
+                tables::view(t, v, x),
+                [tables::seen_sky(t, v, x), tables::ground(t, x)[1], tables::near_sky(t, v, x)],
+            );
             let wants = p.iter().zip(&pair).chain(w.iter().zip(&view)).chain(g.iter().zip(&ground));
             for (want, got) in wants {
                 worst.note((got - want).abs(), || {

@@ -1,17 +1,12 @@
 // The forest as a shader of the ground (BN12, section 6 and 7): fractions and radiances from the tables, for several
 // species mixed by their shares of the optical thickness.
 //
-// With x_i the thickness of species i (density times mean area) and x their sum, crowns of a Poisson distribution give
-// P = exp(-sum x_i sec tv V_i), so paths mix linearly; D and 1 - C, which fall about exponentially as well, mix as products; and what
-// is seen of the trees is of species i in proportion to x_i V_i. Trees keep apart, though, and V, W, T, E, D and C of a species are
-// known for forests of it alone. What keeping apart changes is, to second order in the densities, a sum over pairs of trees of
-// the area that two crowns would share, at most that of the smaller: sum lambda_i lambda_j min(A_i, A_j). A forest of species k
-// alone has lambda^2 A_k of it, so species k is looked up at
-//
-//     x'_k = sum_j x_j min(1, A_k / A_j),
-//
-// and paths grow on from there to x. For the largest species that is x: small trees are to it what they cover. For a small
-// one it is less: however large its neighbours are, each is one.
+// With x_i the thickness of species i (density times mean area), crowns of a Poisson distribution give P = exp(-sum x_i sec tv V_i),
+// so paths mix linearly; D and 1 - C, which fall about exponentially as well, mix as products; and what is seen of the trees is of
+// species i in proportion to x_i V_i. Trees keep apart, though, and V, W, T, E, D and C of a species are known for forests of it
+// alone. In a mix species k is looked up at the thickness of a forest of its own in which as much stands on the path,
+// x'_k = sum_j x_j p_j / p_k with p the paths a unit of thickness of crowns by themselves (src/physics/tables.rs, Known), and paths
+// grow on from there to x.
 #include "physics/tables.glsl"
 #include "physics/handover.glsl"
 
@@ -23,31 +18,46 @@ layout(constant_id = 3) const float TABLE_ANGLES = 16.0;
 layout(constant_id = 4) const float TABLE_DENSITIES = 8.0;
 layout(constant_id = 5) const bool PAIR_TABLES = true; // the sun's average light is known, and has a share
 
+TableSlope slope_of(vec3 v, vec3 n, uint k) {
+    return table_slope(view_table, v, view.v.sun_direction, n, species.items[k].vertical_scale, float(k), TABLE_ANGLES, TABLE_DENSITIES,
+                       PAIR_TABLES);
+}
+
 // What is seen along v (unit, to the viewer) of a slope of normal n; thickness is density times mean area of each species.
 ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIES]) {
     ForestNode f = ForestNode(vec3(0.0), 0.0, vec3(0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    const bool mixed = SPECIES_COUNT > 1u;
     float total = 0.0;
+    vec2 alone[MAX_SPECIES];
+    vec3 all = vec3(0.0); // paths of the pattern's trees by themselves, and the view's of all
     for (uint k = 0u; k < SPECIES_COUNT; k++) {
         // Next to ground without trees there are some: the mix must be defined everywhere.
         thickness[k] += 1e-4;
         total += thickness[k];
+        if (!mixed) continue;
+        alone[k] = table_alone(pair_table, view_table, slope_of(v, n, k), float(k), TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES);
+        vec2 path = thickness[k] * alone[k];
+        all += vec3(species.items[k].listed_density > 0.0 ? vec2(0.0) : path, path.x);
     }
     for (uint k = 0u; k < SPECIES_COUNT; k++) {
         Species s = species.items[k];
-        float share = thickness[k] / total;
-        float known = 0.0;
-        for (uint j = 0u; j < SPECIES_COUNT; j++) known += thickness[j] * min(1.0, s.mean_area / species.items[j].mean_area);
-        TableForest t = table_forest(pair_table, view_table, v, view.v.sun_direction, n, s.vertical_scale, total, known,
-                                     s.max_thickness, float(k), TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES);
-        vec2 g = table_ground(view_table, table_density(known, s.max_thickness, TABLE_DENSITIES), float(k), TABLE_ANGLES, TABLE_DENSITIES);
+        float x = thickness[k], share = x / total;
+        TableKnown known = TableKnown(x, x, x);
+        if (mixed) {
+            // Listed trees keep apart from none, but they are themselves there.
+            vec2 own = s.listed_density > 0.0 ? vec2(x) : vec2(0.0);
+            known = TableKnown(all.x / alone[k].x + own.x, PAIR_TABLES ? all.y / alone[k].y + own.y : 0.0, all.z / alone[k].x);
+        }
+        TableForest t = table_forest(pair_table, view_table, slope_of(v, n, k), total, known, s.max_thickness, float(k),
+                                     TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES, mixed);
         float path = share * t.seen, relative = relative_distance(distance, s.range), part = path * handed_over(relative);
         f.seen += path;
         f.over += part;
         f.converged += path * converged(relative, view.v.convergence);
         f.seen_coverage += share * t.coverage;
-        float grown = thickness[k] / known;
-        f.sky -= grown * log(max(g.x, 1e-6));
-        f.gap -= grown * log(max(1.0 - g.y, 1e-6));
+        float grown = x / min(known.light, s.max_thickness);
+        f.sky -= grown * log(max(t.ground.x, 1e-6));
+        f.gap -= grown * log(max(1.0 - t.ground.y, 1e-6));
         // Where nothing is handed over yet no tree is shown, but the mix must stay defined.
         float weight = max(part, 1e-6 * path);
         vec3 leaf = (0.25 * (1.0 + n.z)) * s.albedo * view.v.sky_radiance;

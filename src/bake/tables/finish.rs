@@ -48,13 +48,14 @@ pub fn tables(
         area: area as f32,
         vertical_scale: crown.vertical_scale() as f32,
         hole: 0.0,
-        sky: [1.0, 0.0],
         pair: vec![[0.0; 4]; m * n * n * n],
         pair_stderr: vec![[0.0; 4]; m * n * n * n],
         view: vec![[0.0; 4]; m * n],
         view_stderr: vec![[0.0; 4]; m * n],
         ground: measured.ground.iter().map(|g| g.map(|e| e.0.clamp(0.0, 1.0) as f32)).collect(),
         ground_stderr: measured.ground.iter().map(|g| g.map(|e| e.1 as f32)).collect(),
+        seen_sky: vec![0.0; m * n],
+        near_sky: vec![1.0; m * n],
     };
     for v in 0..n {
         let theta_v = zenith_node(n, v);

@@ -1,13 +1,17 @@
-//! The sky's light on trees: an even sky is many suns, of each of which the tables know what it does.
+//! The sky's light on trees and on the ground: an even sky is many suns, of each of which the tables know what it does.
 //!
 //! With T what arrives of a sun's light at what is seen of trees, M what light transfer makes of it and ρp what leaves scatter of it
 //! to the viewer, a sky of radiance 1 gives the radiance ∫ T M ρp dl; over half the albedo, which is what a leaf of no
 //! orientation scatters of it, that is E(v, x) of the tables.
 //!
 //! Near trees are drawn from what a z-field knows of a point, its sky visibility δ in the isolated tree and its depth d under the
-//! top, as (s₀ + s₁ v_z) δ / (1 + κ Λ d²): BN12's eq. 9, which has 1 and 0 for s, and κ = ¼ (a hole of radius 2/√Λ around every
-//! tree). Here the three follow from E, of a crown by itself (x = 0) and of the full density, so that forests are about as bright
-//! near as far, and lone trees too.
+//! top, as s(v, x) δ / (1 + κ Λ d²): BN12's eq. 9, which has 1 for s, and κ = ¼ (a hole of radius 2/√Λ around every
+//! tree). Here κ is what makes (s₀ + s₁ v_z) δ / (1 + κ Λ d²) most like E, of a crown by itself (x = 0) and of the full density; and
+//! s(v, x) is what is then left between E and the mean of the rest, so that forests are as bright near as far, and lone trees too.
+//!
+//! Ground that is visible along v gets D_v of the sky, what suns get to it, over cos θ_l: with paths L of view and light together and
+//! L_v of the view, k_g/P = exp(L_v − L). So integrated, the mean D over all ground comes out of exp(−L_l) a little off, by what the few
+//! suns of the sum and the tables' nodes leave; D itself is measured (BN12, eq. 18), and D_v is taken over it.
 //!
 //! Leaves of uniform orientation, seen against an even sky by themselves, have s₀ = 1 and s₁ = ⅔ (r − t)/(r + t): from above more of
 //! their upper sides is seen, which the sky lights, and they reflect more than they let through.
@@ -19,58 +23,40 @@ use super::crown::LeafOptics;
 use crate::physics::light;
 use crate::physics::tables::ForestTables;
 use crate::physics::tables::{
-    angles, density_node, light as sunlight, unscaled_zenith as zenith, zenith_node,
+    angles, density_node, joint_ground, light as sunlight, unscaled_zenith as zenith, visible_ground,
+    zenith_node,
 };
 
 /// Bins an octave of Λd², and octaves from 2⁻¹⁶ on.
 const BINS: f64 = 8.0;
 const OCTAVES: f64 = 24.0;
+/// Most of s(v, x).
+const MOST_NEAR: f64 = 8.0;
 /// Bounds of κ.
 const HOLES: [f64; 2] = [1e-3, 1e3];
 /// Suns of the sky: of cos θ, and of φ over half a turn.
 const SUNS: u32 = 16;
 
-/// What is seen of the sky by what is seen of trees along a direction.
+/// What is seen of the sky by what is seen of trees along a direction, of crowns by themselves and at the full density.
+#[derive(Clone, Debug, Default)]
+pub struct SkySeen([Points; 2]);
+
+/// Points on trees, by how deep they are.
 #[derive(Clone, Debug)]
-pub struct SkySeen {
-    /// Σ a and Σ a δ of crowns by themselves, a being what is seen of a point.
-    alone: [f64; 2],
-    /// Σ a at the full density.
+struct Points {
+    /// Σ a, a being what is seen of a point.
     seen: f64,
-    /// There, Σ a δ and Σ a δ Λd², by bins of Λd².
+    /// Σ a δ and Σ a δ Λd², by bins of Λd² at the full density.
     bins: Vec<[f64; 2]>,
 }
 
-impl Default for SkySeen {
+impl Default for Points {
     fn default() -> Self {
-        SkySeen { alone: [0.0; 2], seen: 0.0, bins: vec![[0.0; 2]; (BINS * OCTAVES) as usize] }
+        Points { seen: 0.0, bins: vec![[0.0; 2]; (BINS * OCTAVES) as usize] }
     }
 }
 
-impl SkySeen {
-    /// Adds a point that sees `occlusion` of the sky in the isolated tree: what is seen of it there and at the full density, and Λd².
-    pub fn note(&mut self, [alone, seen]: [f32; 2], occlusion: f32, depth: f32) {
-        let [alone, seen, occlusion, u] = [alone, seen, occlusion, depth].map(f64::from);
-        self.alone[0] += alone;
-        self.alone[1] += alone * occlusion;
-        self.seen += seen;
-        let bin = (BINS * (u.max(1e-30).log2() + 16.0)).clamp(0.0, BINS * OCTAVES - 1.0) as usize;
-        self.bins[bin][0] += seen * occlusion;
-        self.bins[bin][1] += seen * occlusion * u;
-    }
-
-    /// Adds what was seen elsewhere.
-    pub fn add(&mut self, other: &SkySeen) {
-        self.alone.iter_mut().zip(other.alone).for_each(|(s, o)| *s += o);
-        self.seen += other.seen;
-        self.bins.iter_mut().flatten().zip(other.bins.iter().flatten()).for_each(|(s, o)| *s += o);
-    }
-
-    /// Mean δ of crowns by themselves.
-    fn visible(&self) -> f64 {
-        if self.alone[0] > 0.0 { self.alone[1] / self.alone[0] } else { 0.0 }
-    }
-
+impl Points {
     /// Mean δ / (1 + κ Λ d²), with Λ a part of the full density.
     fn left(&self, hole: f64, part: f64) -> f64 {
         let bins = self.bins.iter().filter(|b| b[0] > 0.0);
@@ -79,7 +65,60 @@ impl SkySeen {
     }
 }
 
-/// Fills in E, s and κ, given all else.
+impl SkySeen {
+    /// Adds a point that sees `occlusion` of the sky in the isolated tree: what is seen of it there and at the full density, and Λd².
+    pub fn note(&mut self, seen: [f32; 2], occlusion: f32, depth: f32) {
+        let [occlusion, u] = [occlusion, depth].map(f64::from);
+        let bin = (BINS * (u.max(1e-30).log2() + 16.0)).clamp(0.0, BINS * OCTAVES - 1.0) as usize;
+        for (points, seen) in self.0.iter_mut().zip(seen.map(f64::from)) {
+            points.seen += seen;
+            points.bins[bin][0] += seen * occlusion;
+            points.bins[bin][1] += seen * occlusion * u;
+        }
+    }
+
+    /// Adds what was seen elsewhere.
+    pub fn add(&mut self, other: &SkySeen) {
+        for (points, other) in self.0.iter_mut().zip(&other.0) {
+            points.seen += other.seen;
+            points.bins.iter_mut().flatten().zip(other.bins.iter().flatten()).for_each(|(s, o)| *s += o);
+        }
+    }
+
+    /// Mean δ / (1 + κ Λ d²), with Λ a part of the full density. What is seen goes over from crowns by themselves, of which inner
+    /// leaves show, to those of the full density, which hide each other's.
+    fn left(&self, hole: f64, part: f64) -> f64 {
+        let [alone, full] = [0, 1].map(|k| self.0[k].left(hole, part));
+        alone + part * (full - alone)
+    }
+}
+
+/// Unit vectors to the suns of an even sky, of equal solid angles: half of them, for what a mirror at the view's plane leaves the same.
+fn suns() -> impl Iterator<Item = [f64; 3]> {
+    (0..SUNS * SUNS).map(|i| {
+        let cosine = (f64::from(i / SUNS) + 0.5) / f64::from(SUNS);
+        let (sine, turn) =
+            ((1.0 - cosine * cosine).sqrt(), PI * (f64::from(i % SUNS) + 0.5) / f64::from(SUNS));
+        [sine * turn.cos(), sine * turn.sin(), cosine]
+    })
+}
+
+/// D_v at a view's zenith angle in scaled space, given D.
+fn seen_sky(t: &ForestTables, theta_v: f64, x: f64, mean: f64) -> f64 {
+    let zenith = zenith(theta_v, f64::from(t.vertical_scale));
+    let v = [zenith.sin(), 0.0, zenith.cos()];
+    let [mut seen, mut all] = [0.0; 2];
+    for l in suns() {
+        let a = angles(v, l, [0.0, 0.0, 1.0], f64::from(t.vertical_scale));
+        seen += l[2] * joint_ground(t, a.v, a.l, a.phi, x);
+        all += l[2] * visible_ground(t, a.l, x);
+    }
+    let visible = visible_ground(t, theta_v, x);
+    // Where nothing is visible, or nothing lit, there is nothing to tell them by.
+    if visible * all > 0.0 { (mean * seen / (visible * all)).clamp(0.0, 1.0) } else { mean }
+}
+
+/// Fills in E, D_v, κ and s, given all else.
 pub fn fill(t: &mut ForestTables, seen: &[SkySeen], leaf: &LeafOptics, forest: &ForestSettings) {
     let (n, m) = (t.angles as usize, t.densities as usize);
     let errors = ForestTables { pair: t.pair_stderr.clone(), ..t.clone() };
@@ -92,6 +131,7 @@ pub fn fill(t: &mut ForestTables, seen: &[SkySeen], leaf: &LeafOptics, forest: &
         // As if all suns were off by one and the same: at most that.
         let error = sky(&errors, leaf, zenith_node(n, k % n), x, |[leaf, bark, _]| [leaf, bark]);
         t.view_stderr[k][1..3].copy_from_slice(&error.map(|e| e as f32));
+        t.seen_sky[k] = seen_sky(t, zenith_node(n, k % n), x, f64::from(t.ground[k / n][0])) as f32;
     }
     let k = f64::from(t.vertical_scale);
     // Cosine of the view's zenith angle, E, and what was seen.
@@ -100,13 +140,17 @@ pub fn fill(t: &mut ForestTables, seen: &[SkySeen], leaf: &LeafOptics, forest: &
         let up = move |v: usize| zenith(zenith_node(n, v), k).cos();
         seen.iter().enumerate().map(move |(v, s)| (up(v), f64::from(view[v][1] + view[v][2]), s))
     };
-    let (s, measured) = law(&[nodes(0).collect(), nodes(m - 1).collect()]);
+    let measured = hole_of(&[nodes(0).collect(), nodes(m - 1).collect()]);
     let hole = if forest.hole_radius > 0.0 { f64::from(forest.hole_radius).powi(-2) } else { measured };
-    (t.sky, t.hole) = (s.map(|s| s as f32), hole as f32);
-    // Another hole than the measured one leaves other light, near and far.
-    for k in (0..m * n).filter(|_| hole != measured) {
-        let part = density_node(m, k / n, 1.0);
-        let ratio = seen[k % n].left(hole, part) / seen[k % n].left(measured, part).max(1e-6);
+    t.hole = hole as f32;
+    for k in 0..m * n {
+        let (seen, part) = (&seen[k % n], density_node(m, k / n, 1.0));
+        let left = seen.left(measured, part);
+        let sky = f64::from(t.view[k][1] + t.view[k][2]);
+        // Where nothing was seen there is nothing to light.
+        t.near_sky[k] = if left > 1e-6 { (sky / left).min(MOST_NEAR) as f32 } else { 1.0 };
+        // Another hole than the measured one leaves other light, near and far.
+        let ratio = if hole == measured { 1.0 } else { seen.left(hole, part) / left.max(1e-6) };
         t.view[k][1..3].iter_mut().for_each(|e| *e *= ratio as f32);
     }
 }
@@ -114,13 +158,13 @@ pub fn fill(t: &mut ForestTables, seen: &[SkySeen], leaf: &LeafOptics, forest: &
 /// A view: cosine of its zenith angle, E, and what was seen.
 type Node<'a> = (f64, f64, &'a SkySeen);
 
-/// s and κ: least squares of (s₀ + s₁ v_z) δ / (1 + κ Λ d²) over E, both of crowns by themselves and of the full density.
-fn law(views: &[Vec<Node>; 2]) -> ([f64; 2], f64) {
+/// κ: least squares of (s₀ + s₁ v_z) δ / (1 + κ Λ d²) over E, both of crowns by themselves and of the full density.
+fn hole_of(views: &[Vec<Node>; 2]) -> f64 {
     // Given κ, s is linear; over κ the loss has one minimum.
-    let loss = |ln_hole: f64| -> (f64, [f64; 2]) {
+    let loss = |ln_hole: f64| -> f64 {
         let hole = ln_hole.exp();
         let [alone, full] = views;
-        let alone = alone.iter().map(|(up, sky, seen)| (*up, *sky, seen.visible()));
+        let alone = alone.iter().map(|(up, sky, seen)| (*up, *sky, seen.left(hole, 0.0)));
         let all = alone.chain(full.iter().map(|(up, sky, seen)| (*up, *sky, seen.left(hole, 1.0))));
         let all: Vec<_> =
             all.filter(|(_, sky, _)| *sky > 1e-6).map(|(up, sky, law)| (up, law / sky)).collect();
@@ -129,14 +173,14 @@ fn law(views: &[Vec<Node>; 2]) -> ([f64; 2], f64) {
         let [y, z] = [sum(&|_, g| g), sum(&|up, g| g * up)];
         let det = a * c - b * b;
         let s = if det > 1e-9 * a * c { [(y * c - z * b) / det, (z * a - y * b) / det] } else { [1.0, 0.0] };
-        (sum(&|up, g| ((s[0] + s[1] * up) * g - 1.0).powi(2)), s)
+        sum(&|up, g| ((s[0] + s[1] * up) * g - 1.0).powi(2))
     };
     let [mut low, mut high] = HOLES.map(f64::ln);
     for _ in 0..60 {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-        if loss(a).0 < loss(b).0 { high = b } else { low = a }
+        if loss(a) < loss(b) { high = b } else { low = a }
     }
-    (loss(low).1, low.exp())
+    low.exp()
 }
 
 /// Σ over the suns of an even sky of what is scattered to a view at the zenith angle `theta_v` of scaled space, by what `part` makes
@@ -154,11 +198,7 @@ fn sky(
     let v = [sine, 0.0, cosine];
     let [r, p] = leaf.scattered.map(f64::from);
     let mut sum = [0.0; 2];
-    for i in 0..SUNS * SUNS {
-        let cosine = (f64::from(i / SUNS) + 0.5) / f64::from(SUNS);
-        let (sine, turn) =
-            ((1.0 - cosine * cosine).sqrt(), PI * (f64::from(i % SUNS) + 0.5) / f64::from(SUNS));
-        let l = [sine * turn.cos(), sine * turn.sin(), cosine];
+    for l in suns() {
         let (a, angle) = (angles(v, l, up, k), light::angle_between(v, l));
         let turned = light::turned_reflectance(f64::from(leaf.turning), angle);
         let scattered = light::leaf_phase(angle, r * turned, p);
@@ -185,7 +225,6 @@ mod tests {
             area: 10.0,
             vertical_scale: 0.7,
             hole: 0.0,
-            sky: [0.0; 2],
             // All that is seen is lit: T is S.
             pair: vec![[0.0, 1.0, 0.0, 1.0]; (m * n * n * n) as usize],
             pair_stderr: vec![[0.0; 4]; (m * n * n * n) as usize],
@@ -193,6 +232,8 @@ mod tests {
             view_stderr: vec![[0.0; 4]; (m * n) as usize],
             ground: vec![[1.0, 0.0]; m as usize],
             ground_stderr: vec![[0.0; 2]; m as usize],
+            seen_sky: vec![0.0; (m * n) as usize],
+            near_sky: vec![0.0; (m * n) as usize],
         };
         // Points under Λd² = 1 that see all of the sky; half of the light is to be left at the full density.
         let mut seen = SkySeen::default();
@@ -209,7 +250,11 @@ mod tests {
             let want = 1.0 + 2.0 / 3.0 * (0.12 - 0.06) / 0.18 * zenith.cos();
             assert!((f64::from(t.view[v][1]) - want).abs() < 2e-3, "{v}: {} {want}", t.view[v][1]);
         }
-        assert!((t.sky[0] - 1.0).abs() < 5e-3 && t.hole > 0.99 && t.hole < 1.01, "{:?} {}", t.sky, t.hole);
+        assert!(t.hole > 0.99 && t.hole < 1.01, "{}", t.hole);
+        // Points see all of the sky by themselves, and half of it at the full density, which is what the hole says: s is E alone.
+        for (k, s) in t.near_sky.iter().enumerate() {
+            assert!((s - t.view[k % n as usize][1]).abs() < 5e-3, "{k}: {s}");
+        }
         // BN12's hole, κ = 1/4: 1/(1 + 1/4) in place of 1/2, near and far.
         let measured = t.view[n as usize][1];
         fill(&mut t, &seen, &leaf, &ForestSettings { hole_radius: 2.0, ..forest });

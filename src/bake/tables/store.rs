@@ -8,7 +8,7 @@ use crate::bake::file::{Fields, Format, load_or_build};
 use crate::bake::{CacheState, SpeciesBake};
 use crate::physics::tables::ForestTables;
 
-const FORMAT: Format = Format { magic: *b"CANOPYFT", version: 12, extension: "forest" };
+const FORMAT: Format = Format { magic: *b"CANOPYFT", version: 14, extension: "forest" };
 
 /// The tables of a species in a forest, from the cache if they are there, else measured and put there; `species` is asked for only
 /// then. With `None` for a cache nothing is read or written; `source` is the key of what the species is baked from
@@ -28,17 +28,18 @@ pub fn load_or_measure<'a>(
     let pairs = 16 * m * n * n * n;
     load_or_build(
         (cache_dir, &FORMAT, &key(source, forest)),
-        &[24, pairs, pairs, 16 * m * n, 16 * m * n, 8 * m, 8 * m],
+        &[16, pairs, pairs, 16 * m * n, 16 * m * n, 8 * m, 8 * m, 4 * m * n, 4 * m * n],
         |parts| decode(&parts, forest),
         |t, put| {
-            put(&little(&[t.max_thickness, t.area, t.vertical_scale, t.hole, t.sky[0], t.sky[1]]))?;
+            put(&little(&[t.max_thickness, t.area, t.vertical_scale, t.hole]))?;
             for part in [&t.pair, &t.pair_stderr] {
                 put(&little(part.as_flattened()))?;
             }
             for part in [&t.view, &t.view_stderr] {
                 put(&little(part.as_flattened()))?;
             }
-            [&t.ground, &t.ground_stderr].into_iter().try_for_each(|p| put(&little(p.as_flattened())))
+            [&t.ground, &t.ground_stderr].into_iter().try_for_each(|p| put(&little(p.as_flattened())))?;
+            [&t.seen_sky, &t.near_sky].into_iter().try_for_each(|p| put(&little(p)))
         },
         || measure_species(species()?, forest, quiet),
         quiet,
@@ -83,7 +84,7 @@ fn decode(parts: &[Vec<u8>], forest: &ForestSettings) -> ForestTables {
         let floats: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
         floats.as_chunks::<N>().0.to_vec()
     }
-    let [max_thickness, area, vertical_scale, hole, sky0, sky1] = rows(&parts[0])[0];
+    let [max_thickness, area, vertical_scale, hole] = rows(&parts[0])[0];
     ForestTables {
         angles: forest.angles,
         densities: forest.densities,
@@ -91,12 +92,13 @@ fn decode(parts: &[Vec<u8>], forest: &ForestSettings) -> ForestTables {
         area,
         vertical_scale,
         hole,
-        sky: [sky0, sky1],
         pair: rows(&parts[1]),
         pair_stderr: rows(&parts[2]),
         view: rows(&parts[3]),
         view_stderr: rows(&parts[4]),
         ground: rows(&parts[5]),
         ground_stderr: rows(&parts[6]),
+        seen_sky: rows::<1>(&parts[7]).concat(),
+        near_sky: rows::<1>(&parts[8]).concat(),
     }
 }

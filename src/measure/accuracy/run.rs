@@ -176,7 +176,8 @@ impl<'a> Work<'a> {
         };
         let facing = (sun_zenith - cell.slope).to_radians().cos().max(0.0);
         let lit = |k: usize| f64::from(albedo[k]) * light.sun[k] * facing / std::f64::consts::PI;
-        let lit = Lit { sun_zenith, ground: luminance([0, 1, 2].map(lit)), averages: false };
+        let lit =
+            Lit { sun_zenith, slope: cell.slope, ground: luminance([0, 1, 2].map(lit)), averages: false };
         let views = views(cell);
         let what = (VERSION, cell, &views, SceneIdentity::new(&patch), albedo);
         let how = (request.method, format!("{:?}", request.until));

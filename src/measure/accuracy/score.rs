@@ -5,6 +5,8 @@ use crate::physics::light::luminance;
 
 /// Views so near to the sun's direction, degrees, are the hotspot's: judged by themselves.
 pub const HOTSPOT: f64 = 5.0;
+/// Views that pass a slope at a smaller angle, degrees, look over the end of its patch, or at it from below: they are not judged.
+pub const LEAST_VIEW: f64 = 10.0;
 
 /// A signed error at a view.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -88,6 +90,8 @@ impl Score {
 pub struct Lit {
     /// Zenith angle of the sun, degrees.
     pub sun_zenith: f64,
+    /// Degrees that the ground descends towards the sun.
+    pub slope: f64,
     /// Luminance of lit ground.
     pub ground: f64,
     /// Whether what was drawn is the mean over all forests of its kind and not of the reference's own trees: what patches differ by is
@@ -136,7 +140,8 @@ fn terms(reference: &Measured, drawn: &Measured, ground: f64) -> Terms {
 pub fn score(reference: &[Measured], drawn: &[Measured], lit: &Lit) -> Score {
     let mut score = Score::default();
     let (mut all, mut sun, mut sky, mut hot) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for (r, d) in reference.iter().zip(drawn) {
+    let above = |r: &Measured| cosine(r.view, lit.slope) >= LEAST_VIEW.to_radians().sin();
+    for (r, d) in reference.iter().zip(drawn).filter(|(r, _)| above(r)) {
         let truth = luminance(r.radiance()).max(1e-12);
         let noise = luminance(if lit.averages { r.stderr } else { r.noise }) / truth;
         let of = |a: [f64; 3], b: [f64; 3]| (r.view, (luminance(a) - luminance(b)) / truth, noise);
@@ -169,7 +174,7 @@ mod tests {
         Measured { view: [zenith, 0.0], fractions, sun: [sun; 3], sky: [sky; 3], ..Measured::default() }
     }
 
-    const LIT: Lit = Lit { sun_zenith: 45.0, ground: 0.1, averages: false };
+    const LIT: Lit = Lit { sun_zenith: 45.0, slope: 0.0, ground: 0.1, averages: false };
 
     #[test]
     fn terms_say_what_is_wrong_and_sum_to_the_bias() {
@@ -193,6 +198,9 @@ mod tests {
             [45.0, 0.0].map(|z| measured(z, [0.0, 0.0, 1.0, 0.0], if z > 0.0 { 0.2 } else { 0.11 }, 0.0));
         let s = score(&truth, &drawn, &LIT);
         assert!((s.hotspot.bias - 1.0).abs() < 1e-12 && (s.all.bias - 0.1).abs() < 1e-12, "{s:?}");
+        // Of a slope of 81 degrees that faces away from the sun, one from above is 9 degrees off, and one from the sun sees its back.
+        let facing_away = Lit { slope: -81.0, ..LIT };
+        assert_eq!(score(&truth, &drawn, &facing_away).all.rms, 0.0);
         truth[1].noise = [0.008; 3];
         let s = score(&truth, &drawn, &LIT);
         assert!((s.all.rms - 0.06).abs() < 1e-12 && (s.all.noise - 0.08).abs() < 1e-12, "{s:?}");
