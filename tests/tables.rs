@@ -171,7 +171,7 @@ fn ground_under_poisson_spheres_is_the_closed_form() {
 /// up to 0.1 less.
 #[test]
 fn sky_on_visible_ground_under_poisson_spheres_is_the_integral() {
-    let forest = ForestSettings { angles: 16, rays: 1024, ..SMALL };
+    let forest = ForestSettings { angles: 16, rays: 4096, ..SMALL };
     let t = &measure(&Sphere::new(3.0, 5.0), &forest, true).unwrap();
     let (r, h, count) = (3.0, 5.0, 20);
     for (i, j) in [(0, 2), (0, 3), (7, 2), (7, 3)] {
