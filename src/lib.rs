@@ -38,7 +38,7 @@
 //! | BN12 eq. 7–12, light | [`physics::light`] | `physics/light.glsl`, `frame/trees/zfield_shade.glsl`, `frame/ground.glsl` | `tests/gpu/light.rs`, `tests/gpu/light_on_ground.rs` |
 //! | self-shadow and leaf angles, measured instead of BN12 eq. 7 and 8 | [`bake`], [`physics::light::self_shadow`] | `physics/light.glsl`, `frame/trees/zfield_shade.glsl` | `tests/bake.rs`, `tests/gpu/light.rs` |
 //! | light transfer (Sloan et al. 2002) of z-field texels | [`bake`], [`physics::transfer`] | `physics/transfer.glsl`, `frame/trees/zfield_shade.glsl` | `tests/bake.rs`, `tests/gpu/transfer.rs` |
-//! | BN12 §6, tables G, T, D, E of far forests | [`bake::tables`], [`forest::tables`], [`physics::tables`] | `physics/tables.glsl` | `tests/tables.rs`, `tests/gpu/tables.rs` |
+//! | BN12 §6, tables G, T, D, E of far forests | [`bake::tables`], [`forest::tables`], [`physics::tables`], [`physics::forest`] | `physics/tables.glsl`, `physics/forest.glsl` | `tests/tables.rs`, `tests/gpu/tables.rs`, `tests/gpu/shader_map.rs` |
 //! | BN12 §6, eq. 13–21, shader-map | [`frame::trees::shader_map`] | `frame/trees/shader_map.*`, `frame/ground.glsl` | `tests/gpu/shader_map.rs` |
 //! | BN12 §7, eq. 22–27, hand-over | [`physics::handover`] | `physics/handover.glsl` | `tests/gpu/tables.rs`, `tests/proofs/` |
 //! | BN12 §9, figures 7 and 8 | [`measure::reflectance`] | | `tests/proofs/scale.rs`, `tests/cli.rs` |

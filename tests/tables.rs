@@ -14,6 +14,7 @@ use canopy::bake::tables::{
 use canopy::bake::{BakeSettings, CacheState, SpeciesBake, bake_species};
 use canopy::physics::correction::Correction;
 use canopy::physics::crown::{Crown, Frame};
+use canopy::physics::forest::{Known, forest};
 use canopy::physics::tables::ForestTables;
 use canopy::physics::{light, tables, views, zfield};
 use glam::DVec3;
@@ -525,14 +526,14 @@ fn slopes_hide_what_single_trees_say() {
             [(of(0.5, 0.0), of(0.7, 2.0)), (of(1.1, 1.0), of(0.4, -1.0)), (of(0.6, 3.0), of(0.6, 3.0))]
         {
             let a = tables::angles(v, l, up, f64::from(t.vertical_scale));
-            let level = tables::forest(t, v, l, up, x, tables::Known::own(x));
+            let level = forest(t, v, l, up, x, Known::own(x));
             assert_eq!(level.seen, x * a.sec_v * tables::view(t, a.v, x)[0]);
             let lit = tables::pair(t, a.v, a.l, a.phi, x)[1] * tables::lit_of_seen(level.seen, level.joint);
             assert_eq!(level.sun[0], lit);
             for tilt in [-0.5f64, -0.2, 0.3, 0.5] {
                 let n = [tilt.sin(), 0.0, tilt.cos()];
                 let cosine = v[0] * n[0] + v[2] * n[2];
-                let f = tables::forest(t, v, l, n, x, tables::Known::own(x));
+                let f = forest(t, v, l, n, x, Known::own(x));
                 // A sphere's shadow along v is its disc over the cosine to the slope, and as much less on the map.
                 let path = x * n[2] / cosine;
                 assert!((f.seen - path).abs() < 0.03 * path, "{v:?} {tilt} {x}: {} {path}", f.seen);

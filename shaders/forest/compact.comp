@@ -8,7 +8,7 @@
 #include "physics/light.glsl"
 #include "physics/correction.glsl"
 #include "physics/transfer.glsl"
-#include "physics/tables.glsl"
+#include "physics/forest.glsl"
 #include "physics/handover.glsl"
 #include "physics/shadow.glsl"
 #include "forest/cull.glsl"

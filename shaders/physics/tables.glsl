@@ -5,7 +5,6 @@
 // W, V, S = T / lit_of_seen, E and the rest are in textures, linear between the nodes.
 
 const float TABLE_MAX_ANGLE = 1.5358897417550099; // 88 degrees
-const float TABLE_MOST_BEYOND = 8.0;              // thicknesses of the last node that paths grow on for
 
 // 1 where the sun is above the slope's horizon, smoothly 0 within two degrees of it.
 float sun_facing(vec3 l, vec3 n) { return smoothstep(0.0, 0.0349, dot(l, n)); }
@@ -81,94 +80,8 @@ vec3 table_ground(sampler2DArray views, float at_v, float density, float species
     return textureLod(views, vec3((n + at_v + 0.5) / (2.0 * n), (density + 0.5) / m, species), 0.0).xyz;
 }
 
-// What is seen of a species' forest.
-struct TableForest {
-    float seen;     // optical path of the view: visible ground is exp of its negative
-    float joint;    // of view and light together, at least that: visible and lit ground
-    float coverage; // by discs, at visible ground
-    float transfer; // what light transfer makes of the sun's light, on average
-    vec2 sun;       // T of leaves and bark
-    vec2 sky;       // E of leaves and bark
-    vec2 ground;    // D_v and C
-};
-
 // Mean of exp(-x t) over t in [0, 1].
 float mean_through(float x) { return x < 1e-2 ? 1.0 - x * (0.5 - x / 6.0) : (1.0 - exp(-x)) / x; }
 
 // What is lit of an even layer among what is seen of it, of the optical paths of the view and of view and light together.
 float lit_of_seen(float seen, float joint) { return mean_through(joint) / mean_through(seen); }
-
-// What a slope of unit normal n makes of v and l: angles sheared, and level; and the view's path through single crowns over that
-// through sheared ones.
-struct TableSlope {
-    TableAngles s, u;
-    float view_path, light_path;
-};
-
-float single_path(sampler2DArray views, float from, float to, vec2 lengths, float species, float n, float m) {
-    float sheared = table_view(views, table_zenith(from, n), 0.0, species, n, m).x;
-    float level = table_view(views, table_zenith(to, n), 0.0, species, n, m).x;
-    return (lengths.y * level) / (lengths.x * sheared);
-}
-
-TableSlope table_slope(sampler2DArray views, vec3 v, vec3 l, vec3 n, float k, float species, float count, float m, bool lit) {
-    TableSlope t;
-    t.s = table_angles(v, l, n, k);
-    t.u = table_angles(v, l, vec3(0.0, 0.0, 1.0), k);
-    t.view_path = single_path(views, t.s.v, t.u.v, vec2(t.s.length_v, t.u.length_v), species, count, m);
-    t.light_path = 1.0;
-    if (lit) t.light_path = single_path(views, t.s.l, t.u.l, vec2(t.s.length_l, t.u.length_l), species, count, m);
-    return t;
-}
-
-// Paths of the view, and of view and light together, a unit of thickness of crowns by themselves.
-vec2 table_alone(sampler3D pairs, sampler2DArray views, TableSlope t, float species, float count, float m, bool lit) {
-    vec3 at = table_coordinates(t.s, count);
-    float seen = t.s.sec_v * t.view_path;
-    vec2 path = vec2(seen * table_view(views, at.z, 0.0, species, count, m).x, 0.0);
-    if (lit) path.y = (seen + t.s.sec_l * t.light_path) * table_pair(pairs, at, 0.0, species, count, m).x;
-    return path;
-}
-
-// Thicknesses of forests of one species alone, at which its tables are read: the view's path, that of view and light together, and
-// light. All are x where the species stands alone.
-struct TableKnown {
-    float seen, joint, light;
-};
-
-// How far beyond the last node a thickness is, in its own. Paths grow on there as they did up to it, and the sky's light falls on.
-float table_beyond(float known, float x_max) { return clamp(known / x_max - 1.0, 0.0, TABLE_MOST_BEYOND); }
-float grown_path(float full, float alone, float beyond) { return full + beyond * max(full - alone, 0.0); }
-
-// Trees of optical thickness x (density times area). The tables are of level ground, which a shear makes of a slope. It leaves how
-// trees stand to each other, and changes crowns: what one crown by itself is to v and l, at density 0, is put in place of what the
-// shear makes of it, and so do the paths through the crowns before it. Nothing changes on level ground.
-TableForest table_forest(sampler3D pairs, sampler2DArray views, TableSlope t, float x, TableKnown known, float x_max,
-                         float species, float count, float m, bool lit, bool mixed) {
-    float at_x = table_density(known.light, x_max, m), at_seen = table_density(known.seen, x_max, m);
-    vec3 at_s = table_coordinates(t.s, count), at_u = table_coordinates(t.u, count);
-    vec4 full = table_view(views, at_s.z, at_x, species, count, m);
-    vec4 vs = table_view(views, at_s.z, 0.0, species, count, m), vu = table_view(views, at_u.z, 0.0, species, count, m);
-    float path = mixed ? table_view(views, at_s.z, at_seen, species, count, m).x : full.x;
-    TableForest f;
-    f.seen = x * t.s.sec_v * grown_path(path, vs.x, table_beyond(known.seen, x_max)) * t.view_path;
-    f.joint = f.seen;
-    f.coverage = full.w;
-    f.ground = table_ground(views, at_s.z, at_x, species, count, m).xy;
-    f.transfer = 1.0;
-    f.sun = vec2(0.0);
-    f.sky = full.yz * ((vu.y + vu.z) / max(vs.y + vs.z, 1e-3));
-    float dimmer = clamp((full.y + full.z) / max(vs.y + vs.z, 1e-3), 1e-3, 1.0);
-    f.sky *= pow(dimmer, table_beyond(known.light, x_max));
-    if (lit) {
-        vec4 p = table_pair(pairs, at_s, at_x, species, count, m);
-        vec4 ps = table_pair(pairs, at_s, 0.0, species, count, m), pu = table_pair(pairs, at_u, 0.0, species, count, m);
-        float w = mixed ? table_pair(pairs, at_s, table_density(known.joint, x_max, m), species, count, m).x : p.x;
-        w = grown_path(w, ps.x, table_beyond(known.joint, x_max));
-        f.joint = max(x * (t.s.sec_v * t.view_path + t.s.sec_l * t.light_path) * w, f.seen);
-        float change = lit_of_seen(f.seen, f.joint) * (pu.y + pu.z) / max(ps.y + ps.z, 1e-3);
-        f.sun = p.yz * min(change, 1.0 / max(p.y + p.z, 1e-6));
-        f.transfer = p.w * (pu.w / max(ps.w, 1e-3));
-    }
-    return f;
-}

@@ -2,6 +2,7 @@
 
 pub mod correction;
 pub mod crown;
+pub mod forest;
 pub mod handover;
 pub mod hash;
 pub mod light;

@@ -6,20 +6,6 @@
 //! unit vectors from the ground to viewer and light; φ in [0, π] is the azimuth between them, 0 where v = l. Only the
 //! labels live in the scaled space: rays are cast in metres, along S⁻¹ of the scaled direction.
 //!
-//! # Slopes
-//! Tables are of level ground. BN12 turn it, with the trees on it, until its normal is the slope's. But trees stand upright, and
-//! as far apart on the map as on level ground: it is a shear, w ↦ (w_x, w_y, w·n/n_z), that takes a slope to level ground, and
-//! leaves which lines pass over which places at which height above the ground. It changes the shape of crowns. How a single
-//! crown looks, at x = 0, the tables know without a shear; what it does to them is therefore taken back (' is of the sheared
-//! directions, which x has no part in):
-//!
-//! - optical paths, L = x sec θ_v' V(θ_v', x) ρ_v with ρ_v = |S v| V(θ_v, 0) / (|S v'| V(θ_v', 0)), which is exact for
-//!   trees of a Poisson distribution; and so for the light;
-//! - light, T = S(x)' T(0)/T(0)' · F(L_v, L_vl), with S and F as under Values;
-//! - sky, E = E(x)' E(0)/E(0)'.
-//!
-//! Against the reference, an oak forest on a slope of 30° away from a sun at 45°: rms 3.6 %, where the turn leaves 9.4 %.
-//!
 //! # Density
 //! x = λA: trees per m², times their mean horizontal area A = π `crown.radius`² E(scale²).
 //!
@@ -49,7 +35,7 @@
 //! - seen_sky, index x·n + v: D_v, the mean sky visibility of the ground that is visible along v. BN12 light all ground with D. But
 //!   ground is seen through the gaps that the sky is seen through: in a forest of oaks that covers half of it, what is visible from
 //!   above gets a fifth more of the sky than the ground's mean. An even sky is many suns, so
-//!   D_v = ∫ k_g(v, l) cos θ_l dl / (π P(v)), of the tables themselves (`bake::tables::sky`).
+//!   D_v = ∫ k_g(v, l) cos θ_l dl / (π P(v)), of the tables themselves (`crate::bake::tables`).
 //! - near_sky, index x·n + v: s(v, x), E over what the hole of eq. 9 leaves of it on average: near trees' sky is brought to E by it.
 //!
 //! Logarithms per optical path are stored, not probabilities, because they hardly vary: what is interpolated is nearly
@@ -302,25 +288,6 @@ pub fn joint_ground(t: &ForestTables, theta_v: f64, theta_l: f64, phi: f64, x: f
     (-x.max(0.0) * (secant(theta_v) + secant(theta_l)) * w).exp().min(visible_ground(t, theta_v, x))
 }
 
-/// What is seen of a species' forest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Forest {
-    /// Optical path of the view: P = exp(−seen).
-    pub seen: f64,
-    /// Of view and light together, at least that: k_g = exp(−joint).
-    pub joint: f64,
-    /// Γ_v.
-    pub coverage: f64,
-    /// T of leaves and of bark, but for [`sun_facing`].
-    pub sun: [f64; 2],
-    /// M.
-    pub transfer: f64,
-    /// E of leaves and of bark.
-    pub sky: [f64; 2],
-    /// D_v and C.
-    pub ground: [f64; 2],
-}
-
 /// Mean of exp(−x t) over t in [0, 1].
 fn mean_through(x: f64) -> f64 {
     if x < 1e-6 { 1.0 - 0.5 * x } else { -(-x).exp_m1() / x }
@@ -339,88 +306,4 @@ pub fn light(t: &ForestTables, theta_v: f64, theta_l: f64, phi: f64, x: f64) -> 
     // Between nodes the product of two interpolated factors may be a little more than all.
     let layer = layer.min(1.0 / (leaf + bark).max(1e-6));
     [layer * leaf, layer * bark, transfer]
-}
-
-/// Thicknesses of the last node that optical paths grow on for beyond it.
-const MOST_BEYOND: f64 = 8.0;
-
-/// Optical paths of the view, and of view and light together, a unit of thickness of crowns by themselves, on a slope of unit normal n.
-pub fn alone(t: &ForestTables, v: [f64; 3], l: [f64; 3], n: [f64; 3]) -> [f64; 2] {
-    let (s, _, [view_path, light_path]) = sheared(t, v, l, n);
-    let seen = s.sec_v * view_path;
-    [seen * view(t, s.v, 0.0)[0], (seen + s.sec_l * light_path) * pair(t, s.v, s.l, s.phi, 0.0)[0]]
-}
-
-/// Thicknesses of forests of one species alone, at which its tables are read.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Known {
-    /// Of which the view's path is read,
-    pub seen: f64,
-    /// that of view and light together,
-    pub joint: f64,
-    /// and light.
-    pub light: f64,
-}
-
-impl Known {
-    /// Where the species stands alone.
-    pub fn own(x: f64) -> Self {
-        Known { seen: x, joint: x, light: x }
-    }
-
-    /// Of species `k` in a mix of thicknesses `x`, paths [`alone`] p, and whether positions are listed, not of the pattern.
-    ///
-    /// Trees of the pattern keep apart: to second order in the densities, the path of a mix is Σ_i x_i p_i + ½ Σ_ij x_i x_j O_ij, where O
-    /// is p_i p_j if no two crowns on it share a line, and less where they are larger than their room. A forest of species k alone
-    /// of thickness x'_k has as much of that a tree where x'_k = Σ_j x_j p_j / p_k. (Of acacias with poplars, and of ashes with
-    /// spruces, half and half, paths were 0.07 and 0.19 more than those of each by itself; that of acacias alone of twice the density
-    /// 0.19, of poplars 0.03, of ashes 0.11, of spruces 0.45 more than twice: O_ij is near √(O_ii O_jj).) Listed trees keep apart from none.
-    pub fn in_mix(k: usize, x: &[f64], alone: &[[f64; 2]], listed: &[bool]) -> Self {
-        let sum = |path: usize, all: bool| -> f64 {
-            (0..x.len())
-                .filter(|j| all || *j == k || !listed[*j])
-                .map(|j| x[j] * alone[j][path] / alone[k][path])
-                .sum()
-        };
-        Known { seen: sum(0, false), joint: sum(1, false), light: sum(0, true) }
-    }
-}
-
-/// Angles on a slope of unit normal n and on level ground, and what single crowns' paths of view and light are over those of sheared ones.
-fn sheared(t: &ForestTables, v: [f64; 3], l: [f64; 3], n: [f64; 3]) -> (Angles, Angles, [f64; 2]) {
-    let [s, u] = [n, [0.0, 0.0, 1.0]].map(|n| angles(v, l, n, f64::from(t.vertical_scale)));
-    let ratio = |of: fn(&Angles) -> f64, k: usize| {
-        u.lengths[k] * view(t, of(&u), 0.0)[0] / (s.lengths[k] * view(t, of(&s), 0.0)[0])
-    };
-    (s, u, [ratio(|a| a.v, 0), ratio(|a| a.l, 1)])
-}
-
-/// What is seen along v of trees of optical thickness x, lit from l, on a slope of unit normal n: see the module's head. The tables
-/// are read where `known` says: beyond the last node paths grow on as they did up to it, and
-/// the sky's light falls on, by the same factor a thickness.
-pub fn forest(t: &ForestTables, v: [f64; 3], l: [f64; 3], n: [f64; 3], x: f64, known: Known) -> Forest {
-    let (s, u, [view_path, light_path]) = sheared(t, v, l, n);
-    let [v0, u0] = [&s, &u].map(|a| view(t, a.v, 0.0));
-    let [_, leaf, bark, coverage] = view(t, s.v, known.light);
-    let [_, lit_leaf, lit_bark, transfer] = pair(t, s.v, s.l, s.phi, known.light);
-    let [ps, pu] = [s, u].map(|a| pair(t, a.v, a.l, a.phi, 0.0));
-    let beyond = |known: f64| (known / f64::from(t.max_thickness) - 1.0).clamp(0.0, MOST_BEYOND);
-    let grown = |known: f64, full: f64, alone: f64| full + beyond(known) * (full - alone).max(0.0);
-    let path = grown(known.seen, view(t, s.v, known.seen)[0], v0[0]);
-    let w = grown(known.joint, pair(t, s.v, s.l, s.phi, known.joint)[0], ps[0]);
-    let seen = x * s.sec_v * path * view_path;
-    let joint = (x * (s.sec_v * view_path + s.sec_l * light_path) * w).max(seen);
-    let change = lit_of_seen(seen, joint) * (pu[1] + pu[2]) / (ps[1] + ps[2]).max(1e-3);
-    let lit = change.min(1.0 / (lit_leaf + lit_bark).max(1e-6));
-    let dimmer = ((leaf + bark) / (v0[1] + v0[2]).max(1e-3)).clamp(1e-3, 1.0);
-    let sky = (u0[1] + u0[2]) / (v0[1] + v0[2]).max(1e-3) * dimmer.powf(beyond(known.light));
-    Forest {
-        seen,
-        joint,
-        coverage,
-        sun: [lit * lit_leaf, lit * lit_bark],
-        transfer: transfer * pu[3] / ps[3].max(1e-3),
-        sky: [sky * leaf, sky * bark],
-        ground: [seen_sky(t, s.v, known.light), ground(t, known.light)[1]],
-    }
 }

@@ -10,7 +10,7 @@ use canopy::ladder::Ladder;
 use canopy::measure::reflectance::{Method, Request, measure};
 use canopy::physics::raster::Raster;
 use canopy::physics::tables::ForestTables;
-use canopy::physics::{light, tables};
+use canopy::physics::{forest, light, tables};
 use canopy::plan::Plan;
 use canopy::scene::{Distribution, Scene, TreePosition};
 use std::f64::consts::PI;
@@ -84,7 +84,7 @@ fn oracle(
 ) -> [[f64; 4]; 3] {
     let l = sun_direction(&scene.sun);
     let level = density * f64::from(row.mean_area);
-    let f = tables::forest(t, v, l, n, level, tables::Known::own(level));
+    let f = forest::forest(t, v, l, n, level, forest::Known::own(level));
     let (open, joint) = ((-f.seen).exp(), (-f.joint).exp());
     let ([leaf, bark], [sky_leaf, sky_bark], [sky, _]) = (f.sun, f.sky, f.ground);
     let trees = 1.0 - open;
@@ -197,12 +197,12 @@ fn mixed(
 ) -> [f64; 4] {
     let (l, up) = (sun_direction(&scene.sun), [0.0, 0.0, 1.0]);
     let x: Vec<f64> = densities.iter().zip(rows).map(|(d, r)| d * f64::from(r.mean_area)).collect();
-    let alone: Vec<[f64; 2]> = tables.iter().map(|t| tables::alone(t, v, l, up)).collect();
+    let alone: Vec<[f64; 2]> = tables.iter().map(|t| forest::alone(t, v, l, up)).collect();
     let listed: Vec<bool> = rows.iter().map(|r| r.listed_density > 0.0).collect();
     let total: f64 = x.iter().sum();
     let [mut seen, mut joint, mut lit] = [0.0; 3];
     for (k, t) in tables.iter().enumerate() {
-        let f = tables::forest(t, v, l, up, total, tables::Known::in_mix(k, &x, &alone, &listed));
+        let f = forest::forest(t, v, l, up, total, forest::Known::in_mix(k, &x, &alone, &listed));
         let share = x[k] / total;
         seen += share * f.seen;
         joint += share * f.joint;

@@ -5,9 +5,9 @@
 // so paths mix linearly; D and 1 - C, which fall about exponentially as well, mix as products; and what is seen of the trees is of
 // species i in proportion to x_i V_i. Trees keep apart, though, and V, W, T, E, D and C of a species are known for forests of it
 // alone. In a mix species k is looked up at the thickness of a forest of its own in which as much stands on the path,
-// x'_k = sum_j x_j p_j / p_k with p the paths a unit of thickness of crowns by themselves (src/physics/tables.rs, Known), and paths
+// x'_k = sum_j x_j p_j / p_k with p the paths a unit of thickness of crowns by themselves (src/physics/forest.rs, Known), and paths
 // grow on from there to x.
-#include "physics/tables.glsl"
+#include "physics/forest.glsl"
 #include "physics/handover.glsl"
 
 layout(binding = 8) uniform sampler3D pair_table;
