@@ -109,8 +109,8 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     float phase_angle = angle_between(to_camera, v.sun_direction);
     vec3 phase = leaf_phase(to_camera, v.sun_direction, turned_reflectance(kind.reflectance, kind.turning, phase_angle), kind.transmittance);
     t.sun = tint * phase * hotspot(to_camera, v.sun_direction, v.hotspot_amplitude, v.hotspot_width) * v.sun_irradiance;
-    // rho / 2 of a leaf that the upper hemisphere lights, times the visibility of the sky above a slope (BN12, eq. 9).
-    t.sky = tint * kind.albedo * (0.25 * (1.0 + ground.z)) * v.sky_radiance;
+    // rho / 2 of a leaf that the upper hemisphere lights, times the visibility of the sky above a slope.
+    t.sky = tint * kind.albedo * (0.5 * sky_over_slope(ground.z, density * kind.mean_area)) * v.sky_radiance;
     float nu = converged(relative, v.convergence), mean_lit = average_light(t, kind, to_camera, ground, density, nu);
     // The tables' average has it already.
     CorrectionTerms y = correction_terms(to_camera.z, v.sun_direction.z, phase_angle);

@@ -71,7 +71,7 @@ GroundLight ground_light(GroundPoint at, vec3 n) {
     float contrast = mix(ground_contrast(g.coverage, at.paths.w, view.v.ground_contrast), 1.0, nu);
     float open = open_ground(thickness * at.paths.x, at.paths.x / max(at.paths.y, 1e-9), g.coverage, expected);
     vec3 sun = reflectance * (cosine * lit / PI) * view.v.sun_irradiance;
-    vec3 sky = reflectance * (0.5 * (1.0 + n.z) * exp(-thickness * at.vertical.x) * contrast) * view.v.sky_radiance;
+    vec3 sky = reflectance * (ground_sky(n.z, exp(-thickness * at.vertical.x), thickness) * contrast) * view.v.sky_radiance;
     g.sun = mix(max(at.tree_sun.rgb, 0.0), sun, open);
     g.sky = mix(max(at.tree_sky.rgb, 0.0), sky, open);
     g.trees = 1.0 - open;

@@ -20,6 +20,7 @@ struct TableForest {
 struct TableSlope {
     TableAngles s, u;
     float view_path, light_path;
+    float up; // vertical part of n
 };
 
 float single_path(sampler2DArray views, float from, float to, vec2 lengths, float species, float n, float m) {
@@ -34,6 +35,7 @@ TableSlope table_slope(sampler2DArray views, vec3 v, vec3 l, vec3 n, float k, fl
     t.u = table_angles(v, l, vec3(0.0, 0.0, 1.0), k);
     t.view_path = single_path(views, t.s.v, t.u.v, vec2(t.s.length_v, t.u.length_v), species, count, m);
     t.light_path = 1.0;
+    t.up = n.z;
     if (lit) t.light_path = single_path(views, t.s.l, t.u.l, vec2(t.s.length_l, t.u.length_l), species, count, m);
     return t;
 }
@@ -71,7 +73,10 @@ TableForest table_forest(sampler3D pairs, sampler2DArray views, TableSlope t, fl
     f.seen = x * t.s.sec_v * grown_path(path, vs.x, table_beyond(known.seen, x_max)) * t.view_path;
     f.joint = f.seen;
     f.coverage = full.w;
-    f.ground = table_ground(views, at_s.z, at_x, species, count, m).xy;
+    // Of as many trees as stand on a metre of the slope: about its normal that is level ground.
+    float at_steep = table_density(known.light * t.up, x_max, m);
+    f.ground.x = table_ground(views, at_s.z, at_steep, species, count, m).x;
+    f.ground.y = table_ground(views, at_s.z, at_x, species, count, m).y;
     f.transfer = 1.0;
     f.sun = vec2(0.0);
     f.sky = full.yz * ((vu.y + vu.z) / max(vs.y + vs.z, 1e-3));

@@ -33,5 +33,18 @@ vec3 leaf_phase(vec3 v, vec3 l, vec3 r, vec3 t) {
 // Sky seen from depth d on the axis of a cylindrical hole (BN12, eq. 9): 1 / (1 + d2 / r2), with 1 / r2 given.
 float hole_occlusion(float d, float inverse_r2) { return 1.0 / (1.0 + d * d * inverse_r2); }
 
+// Sine of a slope's angle, from the cosine.
+float slope_sine(float up) { return max(sqrt(max(1.0 - up * up, 0.0)), 1e-3); }
+
+// Sky on the ground of a slope, of what trees leave of the whole hemisphere about its normal: what lies under the horizon brings nothing.
+float ground_sky(float up, float visible, float thickness) {
+    return max(visible - 0.5 * (1.0 - up) * exp(-1.5 * thickness * up / slope_sine(up)), 0.0);
+}
+
+// Sky on a tree on that slope over that on one of level ground: the slope hides a lune.
+float sky_over_slope(float up, float thickness) {
+    return 1.0 - atan(slope_sine(up), up) / PI * exp(-0.75 * thickness * up / slope_sine(up));
+}
+
 // Contrast of the ground near trees (BN12, eq. 10): mean 1 where the expected coverage is right; never negative.
 float ground_contrast(float coverage, float expected, float a3) { return max(1.0 - a3 * (coverage - expected), 0.0); }

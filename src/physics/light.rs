@@ -58,6 +58,24 @@ pub fn hole_occlusion(d: f64, inverse_r2: f64) -> f64 {
     1.0 / (1.0 + d * d * inverse_r2)
 }
 
+/// Sine of a slope's angle, from the cosine.
+fn slope_sine(up: f64) -> f64 {
+    (1.0 - up * up).max(0.0).sqrt().max(1e-3)
+}
+
+/// Sky on the ground of a slope whose unit normal has the vertical part `up`, under trees of an optical thickness on the map, that leave
+/// `visible` of the whole hemisphere about the normal. Directions of that hemisphere under the horizon, (1 − up)/2 of it by cosine, bring
+/// nothing. They graze the slope, at two thirds of its sine on average (as cosines weigh them), and most are behind trees anyway.
+pub fn ground_sky(up: f64, visible: f64, thickness: f64) -> f64 {
+    (visible - 0.5 * (1.0 - up) * (-1.5 * thickness * up / slope_sine(up)).exp()).max(0.0)
+}
+
+/// Sky on a tree on that slope, over that on one of level ground: leaves of all orientations lose the lune between the horizon and the
+/// ground that rises behind, the slope's angle over π of the sky, of which they see what half of the trees in front leave.
+pub fn sky_over_slope(up: f64, thickness: f64) -> f64 {
+    1.0 - up.clamp(-1.0, 1.0).acos() / PI * (-0.75 * thickness * up / slope_sine(up)).exp()
+}
+
 /// 2 E₃(x): mean sky visibility of the ground under opaque Poisson crowns of optical thickness x = density × area, the
 /// closed form of D (BN12, eq. 18) for opaque crowns. E₁ by its series below 1 and its continued fraction above.
 pub fn ground_visibility(x: f64) -> f64 {
@@ -135,6 +153,41 @@ mod tests {
             assert!((ground_visibility(x) - sum).abs() < 1e-8, "x {x}: {} {sum}", ground_visibility(x));
         }
         assert_eq!(ground_visibility(0.0), 1.0);
+    }
+
+    /// Under a layer of spheres parallel to a slope, of λ A = x on the map and so x n_z on the slope, exp(−x n_z / (l·n)) of a sun's light
+    /// arrives; ∫ over the sky above the horizon, by cosine, against the closed form less the lune. One mean angle stands for the
+    /// lune's: a hundredth.
+    #[test]
+    fn the_sky_on_a_slope_is_that_above_its_normal_less_what_is_under_the_horizon() {
+        let count = 400;
+        for slope in [0.0f64, 10.0, 20.0, 30.0] {
+            let (sine, up) = slope.to_radians().sin_cos();
+            for x in [0.0, 0.1, 0.4, 1.5] {
+                let (mut sum, mut free) = (0.0, 0.0);
+                for k in 0..count * count {
+                    let (u, turn) = (
+                        (f64::from(k / count) + 0.5) / f64::from(count),
+                        2.0 * PI * (f64::from(k % count) + 0.5) / f64::from(count),
+                    );
+                    // By cosine about the normal (sin, 0, cos); what is under the horizon brings nothing.
+                    let (across, along) = ((1.0 - u).sqrt(), u.sqrt());
+                    if along * up - across * turn.cos() * sine > 0.0 {
+                        sum += (-x * up / along).exp();
+                    }
+                    free += (-x * up / along).exp();
+                }
+                let [sum, free] = [sum, free].map(|s| s / f64::from(count * count));
+                let got = ground_sky(up, free, x);
+                assert!((got - sum).abs() < 0.01, "{slope} {x}: {got} {sum}");
+                assert!((free - ground_visibility(x * up)).abs() < 1e-3);
+            }
+            // A lone tree loses the slope's share of half a turn.
+            assert!(
+                (sky_over_slope(up, 0.0) - (1.0 - slope / 180.0)).abs() < 1e-9
+                    && sky_over_slope(up, 9.0) <= 1.0
+            );
+        }
     }
 
     #[test]

@@ -86,7 +86,8 @@ fn oracle(
     let level = density * f64::from(row.mean_area);
     let f = forest::forest(t, v, l, n, level, forest::Known::own(level));
     let (open, joint) = ((-f.seen).exp(), (-f.joint).exp());
-    let ([leaf, bark], [sky_leaf, sky_bark], [sky, _]) = (f.sun, f.sky, f.ground);
+    let ([leaf, bark], [sky_leaf, sky_bark]) = (f.sun, f.sky);
+    let sky = light::ground_sky(n[2], f.ground[0], level);
     let trees = 1.0 - open;
     let facing = tables::sun_facing(l, n);
     let lit = facing * (leaf + bark);
@@ -106,8 +107,9 @@ fn oracle(
         let full = light::leaf_phase(angle, r * turned, t) * hotspot * E[c];
         from_sun[c] =
             trees * facing * f.transfer * full * (leaf + b * bark) + joint * ALBEDO[c] * cosine / PI * E[c];
-        let leaves = 0.25 * (1.0 + n[2]) * f64::from(row.albedo[c]) * (sky_leaf + b * sky_bark);
-        from_sky[c] = SKY[c] * (trees * leaves + open * ALBEDO[c] * 0.5 * (1.0 + n[2]) * sky);
+        let leaves =
+            0.5 * light::sky_over_slope(n[2], level) * f64::from(row.albedo[c]) * (sky_leaf + b * sky_bark);
+        from_sky[c] = SKY[c] * (trees * leaves + open * ALBEDO[c] * sky);
     }
     [[joint, open - joint, trees * lit, trees * (1.0 - lit)], from_sun, from_sky]
 }

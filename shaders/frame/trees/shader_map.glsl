@@ -55,12 +55,13 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         f.over += part;
         f.converged += path * converged(relative, view.v.convergence);
         f.seen_coverage += share * t.coverage;
-        float grown = x / min(known.light, s.max_thickness);
-        f.sky -= grown * log(max(t.ground.x, 1e-6));
+        // As many trees as stand on a metre of the slope.
+        float grown = x / min(known.light, s.max_thickness), steep = x * n.z / min(known.light * n.z, s.max_thickness);
+        f.sky -= steep * log(max(t.ground.x, 1e-6));
         f.gap -= grown * log(max(1.0 - t.ground.y, 1e-6));
         // Where nothing is handed over yet no tree is shown, but the mix must stay defined.
         float weight = max(part, 1e-6 * path);
-        vec3 leaf = (0.25 * (1.0 + n.z)) * s.albedo * view.v.sky_radiance;
+        vec3 leaf = (0.5 * sky_over_slope(n.z, known.light)) * s.albedo * view.v.sky_radiance;
         f.tree_sky += weight * leaf * (t.sky.x + t.sky.y * s.bark_ratio);
         if (PAIR_TABLES) {
             f.joint += share * t.joint;
