@@ -53,13 +53,9 @@ uint lookup(vec3 w, out vec2 weights) {
 
 // The light of the average tree around this one, towards which its own converges with nu (BN12, eq. 22 and 23); returns what of it is
 // lit.
-float average_light(inout Tree t, Species kind, vec3 to_camera, vec3 ground, float density, float nu) {
-    float x = density * kind.mean_area;
-    float species = float(t.species);
-    TableSlope slope = table_slope(view_table, to_camera, view.v.sun_direction, ground, kind.vertical_scale, species, TABLE_ANGLES,
-                                   TABLE_DENSITIES, PAIR_TABLES);
-    TableForest f = table_forest(pair_table, view_table, slope, x, TableKnown(x, x, x), kind.max_thickness, species, TABLE_ANGLES,
-                                 TABLE_DENSITIES, PAIR_TABLES, false);
+float average_light(inout Tree t, Species kind, TableSlope slope, vec3 ground, float x, float nu) {
+    TableForest f = table_forest(pair_table, view_table, slope, x, TableKnown(x, x, x), kind.max_thickness, float(t.species),
+                                 TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES, false);
     float lit = nu * sun_facing(view.v.sun_direction, ground);
     t.mean_sun = (lit * f.transfer) * t.sun * (f.sun.x + f.sun.y * kind.bark_ratio);
     t.mean_sky = nu * t.sky * (f.sky.x + f.sky.y * kind.bark_ratio);
@@ -110,8 +106,11 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     vec3 phase = leaf_phase(to_camera, v.sun_direction, turned_reflectance(kind.reflectance, kind.turning, phase_angle), kind.transmittance);
     t.sun = tint * phase * hotspot(to_camera, v.sun_direction, v.hotspot_amplitude, v.hotspot_width) * v.sun_irradiance;
     // rho / 2 of a leaf that the upper hemisphere lights, times the visibility of the sky above a slope.
-    t.sky = tint * kind.albedo * (0.5 * sky_over_slope(ground.z, density * kind.mean_area)) * v.sky_radiance;
-    float nu = converged(relative, v.convergence), mean_lit = average_light(t, kind, to_camera, ground, density, nu);
+    float thickness = density * kind.mean_area, species = float(t.species);
+    t.sky = tint * kind.albedo * (0.5 * sky_over_slope(ground.z, thickness)) * v.sky_radiance;
+    TableSlope slope = table_slope(view_table, to_camera, v.sun_direction, ground, kind.vertical_scale, species, TABLE_ANGLES,
+                                   TABLE_DENSITIES, PAIR_TABLES);
+    float nu = converged(relative, v.convergence), mean_lit = average_light(t, kind, slope, ground, thickness, nu);
     // The tables' average has it already.
     CorrectionTerms y = correction_terms(to_camera.z, v.sun_direction.z, phase_angle);
     vec2 lit = correction_line(kind.lit, y, transfer_strength(sqrt(phase_angle))), sent = correction_line(kind.sent, y, 1.0);
@@ -121,9 +120,8 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     t.own_lit = packHalf2x16(vec2(1.0 - nu, lit.x));
     t.mean_lit_change = packHalf2x16(vec2(mean_lit, lit.y));
     // What the hole leaves of it, brought to what is seen of the tables' forest along this direction.
-    TableAngles level = table_angles(to_camera, to_camera, vec3(0.0, 0.0, 1.0), kind.vertical_scale);
-    t.sky *= table_ground(view_table, table_zenith(level.v, TABLE_ANGLES), table_density(density * kind.mean_area, kind.max_thickness, TABLE_DENSITIES),
-                          float(t.species), TABLE_ANGLES, TABLE_DENSITIES).z;
+    t.sky *= table_ground(view_table, table_zenith(slope.u.v, TABLE_ANGLES), table_density(thickness, kind.max_thickness, TABLE_DENSITIES),
+                          species, TABLE_ANGLES, TABLE_DENSITIES).z;
     t.cascade = cascade_at(v.cascade_far, v.cascade_count, distance);
     return t;
 }
