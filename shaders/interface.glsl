@@ -89,6 +89,7 @@ struct Species {
     float leaf_shadow;                // c of the crown's self-shadow, 1/sqrt(rad)
     vec3 albedo;                      // of what is seen of a crown, for the sky's light
     float turning;                    // change of the reflectance with the phase angle, 1/rad
+    float sky_path;                   // mean optical path of the sky's light through single crowns, a unit of thickness
     float hole;                       // 1 / squared radius of the hole around a tree, over the density: BN12 eq. 9
     vec4 lit[4];                      // correction of the share of a crown that is lit: two at the middle of the tree, two of their change
     vec4 sent[4];                     // correction of the sunlight that it sends

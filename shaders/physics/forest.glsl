@@ -49,10 +49,10 @@ vec2 table_alone(sampler3D pairs, sampler2DArray views, TableSlope t, float spec
     return path;
 }
 
-// Thicknesses of forests of one species alone, at which its tables are read: the view's path, that of view and light together, and
-// light. All are x where the species stands alone.
+// Thicknesses of forests of one species alone, at which its tables are read: the view's path; that of view and light together, and
+// what is lit of trees; the sky's light; and coverage by discs. All are x where the species stands alone.
 struct TableKnown {
-    float seen, joint, light;
+    float seen, joint, sky, discs;
 };
 
 // How far beyond the last node a thickness is, in its own. Paths grow on there as they did up to it, and the sky's light falls on.
@@ -64,29 +64,30 @@ float grown_path(float full, float alone, float beyond) { return full + beyond *
 // shear makes of it, and so do the paths through the crowns before it. Nothing changes on level ground.
 TableForest table_forest(sampler3D pairs, sampler2DArray views, TableSlope t, float x, TableKnown known, float x_max,
                          float species, float count, float m, bool lit, bool mixed) {
-    float at_x = table_density(known.light, x_max, m), at_seen = table_density(known.seen, x_max, m);
+    float at_sky = table_density(known.sky, x_max, m), at_seen = table_density(known.seen, x_max, m);
+    float at_discs = table_density(known.discs, x_max, m);
     vec3 at_s = table_coordinates(t.s, count), at_u = table_coordinates(t.u, count);
-    vec4 full = table_view(views, at_s.z, at_x, species, count, m);
+    vec4 full = table_view(views, at_s.z, at_sky, species, count, m);
     vec4 vs = table_view(views, at_s.z, 0.0, species, count, m), vu = table_view(views, at_u.z, 0.0, species, count, m);
     float path = mixed ? table_view(views, at_s.z, at_seen, species, count, m).x : full.x;
+    float coverage = mixed ? table_view(views, at_s.z, at_discs, species, count, m).w : full.w;
     TableForest f;
     f.seen = x * t.s.sec_v * grown_path(path, vs.x, table_beyond(known.seen, x_max)) * t.view_path;
     f.joint = f.seen;
-    f.coverage = full.w;
+    f.coverage = coverage;
     // Of as many trees as stand on a metre of the slope: about its normal that is level ground.
-    float at_steep = table_density(known.light * t.up, x_max, m);
+    float at_steep = table_density(known.sky * t.up, x_max, m);
     f.ground.x = table_ground(views, at_s.z, at_steep, species, count, m).x;
-    f.ground.y = table_ground(views, at_s.z, at_x, species, count, m).y;
+    f.ground.y = table_ground(views, at_s.z, at_discs, species, count, m).y;
     f.transfer = 1.0;
     f.sun = vec2(0.0);
     f.sky = full.yz * ((vu.y + vu.z) / max(vs.y + vs.z, 1e-3));
     float dimmer = clamp((full.y + full.z) / max(vs.y + vs.z, 1e-3), 1e-3, 1.0);
-    f.sky *= pow(dimmer, table_beyond(known.light, x_max));
+    f.sky *= pow(dimmer, table_beyond(known.sky, x_max));
     if (lit) {
-        vec4 p = table_pair(pairs, at_s, at_x, species, count, m);
+        vec4 p = table_pair(pairs, at_s, table_density(known.joint, x_max, m), species, count, m);
         vec4 ps = table_pair(pairs, at_s, 0.0, species, count, m), pu = table_pair(pairs, at_u, 0.0, species, count, m);
-        float w = mixed ? table_pair(pairs, at_s, table_density(known.joint, x_max, m), species, count, m).x : p.x;
-        w = grown_path(w, ps.x, table_beyond(known.joint, x_max));
+        float w = grown_path(p.x, ps.x, table_beyond(known.joint, x_max));
         f.joint = max(x * (t.s.sec_v * t.view_path + t.s.sec_l * t.light_path) * w, f.seen);
         float change = lit_of_seen(f.seen, f.joint) * (pu.y + pu.z) / max(ps.y + ps.z, 1e-3);
         f.sun = p.yz * min(change, 1.0 / max(p.y + p.z, 1e-6));

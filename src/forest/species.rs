@@ -5,6 +5,7 @@ use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Resource, Sampler, vk};
 use crate::land::density::{DensityMap, HEIGHT_SOFTNESS, SLOPE_SOFTNESS, density_map};
 use crate::physics::correction::Correction;
+use crate::physics::forest;
 use crate::physics::masks::combination_table;
 use crate::physics::outline;
 use crate::physics::raster::Raster;
@@ -282,6 +283,7 @@ fn rows(
             }),
             mean_area: std::f32::consts::PI * crown.radius.powi(2) * mean_squared_scale(species) as f32,
             vertical_scale: tables.vertical_scale,
+            sky_path: forest::sky_path(tables) as f32,
             hole: tables.hole,
             max_thickness: tables.max_thickness,
             listed_density: maps[k].as_ref().map_or(0.0, |m| m.listed as f32),

@@ -50,38 +50,60 @@ pub fn alone(t: &ForestTables, v: [f64; 3], l: [f64; 3], n: [f64; 3]) -> [f64; 2
     [seen * view(t, s.v, 0.0)[0], (seen + s.sec_l * light_path) * pair(t, s.v, s.l, s.phi, 0.0)[0]]
 }
 
+/// Mean optical path of the sky's light through crowns by themselves, a unit of thickness: that of all directions of level ground,
+/// weighted by the light that they bring to it. Between 1 (lids) and 2 (balls).
+pub fn sky_path(t: &ForestTables) -> f64 {
+    let (steps, up) = (64, [0.0, 0.0, 1.0]);
+    let from = |k: usize| {
+        // Of even weight: cos²θ.
+        let square = (k as f64 + 0.5) / f64::from(steps as u32);
+        let w = [(1.0 - square).sqrt(), 0.0, square.sqrt()];
+        let a = angles(w, w, up, f64::from(t.vertical_scale));
+        a.sec_v * view(t, a.v, 0.0)[0]
+    };
+    (0..steps).map(from).sum::<f64>() / f64::from(steps as u32)
+}
+
 /// Thicknesses of forests of one species alone, at which its tables are read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Known {
     /// Of which the view's path is read,
     pub seen: f64,
-    /// that of view and light together,
+    /// that of view and light together and what is lit of trees,
     pub joint: f64,
-    /// and light.
-    pub light: f64,
+    /// the sky's light,
+    pub sky: f64,
+    /// and coverage by discs.
+    pub discs: f64,
 }
 
 impl Known {
     /// Where the species stands alone.
     pub fn own(x: f64) -> Self {
-        Known { seen: x, joint: x, light: x }
+        Known { seen: x, joint: x, sky: x, discs: x }
     }
 
-    /// Of species `k` in a mix of thicknesses `x`, paths [`alone`] p, and whether positions are listed, not of the pattern.
+    /// Of species `k` in a mix of thicknesses `x`, paths [`alone`] p, [`sky_path`]s `sky`, and whether positions are listed, not of the
+    /// pattern.
     ///
     /// Trees of the pattern keep apart: to second order in the densities, the path of a mix is Σ_i x_i p_i + ½ Σ_ij x_i x_j O_ij, where O
     /// is p_i p_j if no two crowns on it share a line, and less where they are larger than their room. A forest of species k alone
     /// of thickness x'_k has as much of that a tree where x'_k = Σ_j x_j p_j / p_k. (Of acacias with poplars, and of ashes with
     /// spruces, half and half, paths were 0.07 and 0.19 more than those of each by itself; that of acacias alone of twice the density
     /// 0.19, of poplars 0.03, of ashes 0.11, of spruces 0.45 more than twice: O_ij is near √(O_ii O_jj).) Listed trees keep apart from none.
-    pub fn in_mix(k: usize, x: &[f64], alone: &[[f64; 2]], listed: &[bool]) -> Self {
-        let sum = |path: usize, all: bool| -> f64 {
-            (0..x.len())
-                .filter(|j| all || *j == k || !listed[*j])
-                .map(|j| x[j] * alone[j][path] / alone[k][path])
-                .sum()
+    ///
+    /// The sky's light comes down by another way than the view's: it is read where as much stands on that. Discs are as thick as they are
+    /// wide.
+    pub fn in_mix(k: usize, x: &[f64], alone: &[[f64; 2]], sky: &[f64], listed: &[bool]) -> Self {
+        let apart = |path: &dyn Fn(usize) -> f64| -> f64 {
+            (0..x.len()).filter(|j| *j == k || !listed[*j]).map(|j| x[j] * path(j) / path(k)).sum()
         };
-        Known { seen: sum(0, false), joint: sum(1, false), light: sum(0, true) }
+        Known {
+            seen: apart(&|j| alone[j][0]),
+            joint: apart(&|j| alone[j][1]),
+            sky: x.iter().zip(sky).map(|(x, path)| x * path / sky[k]).sum(),
+            discs: apart(&|_| 1.0),
+        }
     }
 }
 
@@ -100,27 +122,27 @@ fn sheared(t: &ForestTables, v: [f64; 3], l: [f64; 3], n: [f64; 3]) -> (Angles, 
 pub fn forest(t: &ForestTables, v: [f64; 3], l: [f64; 3], n: [f64; 3], x: f64, known: Known) -> Forest {
     let (s, u, [view_path, light_path]) = sheared(t, v, l, n);
     let [v0, u0] = [&s, &u].map(|a| view(t, a.v, 0.0));
-    let [_, leaf, bark, coverage] = view(t, s.v, known.light);
-    let [_, lit_leaf, lit_bark, transfer] = pair(t, s.v, s.l, s.phi, known.light);
+    let [_, leaf, bark, _] = view(t, s.v, known.sky);
+    let [joint, lit_leaf, lit_bark, transfer] = pair(t, s.v, s.l, s.phi, known.joint);
     let [ps, pu] = [s, u].map(|a| pair(t, a.v, a.l, a.phi, 0.0));
     let beyond = |known: f64| (known / f64::from(t.max_thickness) - 1.0).clamp(0.0, MOST_BEYOND);
     let grown = |known: f64, full: f64, alone: f64| full + beyond(known) * (full - alone).max(0.0);
     let path = grown(known.seen, view(t, s.v, known.seen)[0], v0[0]);
-    let w = grown(known.joint, pair(t, s.v, s.l, s.phi, known.joint)[0], ps[0]);
+    let w = grown(known.joint, joint, ps[0]);
     let seen = x * s.sec_v * path * view_path;
     let joint = (x * (s.sec_v * view_path + s.sec_l * light_path) * w).max(seen);
     let change = lit_of_seen(seen, joint) * (pu[1] + pu[2]) / (ps[1] + ps[2]).max(1e-3);
     let lit = change.min(1.0 / (lit_leaf + lit_bark).max(1e-6));
     let dimmer = ((leaf + bark) / (v0[1] + v0[2]).max(1e-3)).clamp(1e-3, 1.0);
-    let sky = (u0[1] + u0[2]) / (v0[1] + v0[2]).max(1e-3) * dimmer.powf(beyond(known.light));
+    let sky = (u0[1] + u0[2]) / (v0[1] + v0[2]).max(1e-3) * dimmer.powf(beyond(known.sky));
     Forest {
         seen,
         joint,
-        coverage,
+        coverage: view(t, s.v, known.discs)[3],
         sun: [lit * lit_leaf, lit * lit_bark],
         transfer: transfer * pu[3] / ps[3].max(1e-3),
         sky: [sky * leaf, sky * bark],
         // Of as many trees as stand on a metre of the slope: about its normal that is level ground.
-        ground: [seen_sky(t, s.v, known.light * n[2]), ground(t, known.light)[1]],
+        ground: [seen_sky(t, s.v, known.sky * n[2]), ground(t, known.discs)[1]],
     }
 }

@@ -200,11 +200,12 @@ fn mixed(
     let (l, up) = (sun_direction(&scene.sun), [0.0, 0.0, 1.0]);
     let x: Vec<f64> = densities.iter().zip(rows).map(|(d, r)| d * f64::from(r.mean_area)).collect();
     let alone: Vec<[f64; 2]> = tables.iter().map(|t| forest::alone(t, v, l, up)).collect();
+    let sky: Vec<f64> = tables.iter().map(|t| forest::sky_path(t)).collect();
     let listed: Vec<bool> = rows.iter().map(|r| r.listed_density > 0.0).collect();
     let total: f64 = x.iter().sum();
     let [mut seen, mut joint, mut lit] = [0.0; 3];
     for (k, t) in tables.iter().enumerate() {
-        let f = forest::forest(t, v, l, up, total, forest::Known::in_mix(k, &x, &alone, &listed));
+        let f = forest::forest(t, v, l, up, total, forest::Known::in_mix(k, &x, &alone, &sky, &listed));
         let share = x[k] / total;
         seen += share * f.seen;
         joint += share * f.joint;

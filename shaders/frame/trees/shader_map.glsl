@@ -6,7 +6,7 @@
 // species i in proportion to x_i V_i. Trees keep apart, though, and V, W, T, E, D and C of a species are known for forests of it
 // alone. In a mix species k is looked up at the thickness of a forest of its own in which as much stands on the path,
 // x'_k = sum_j x_j p_j / p_k with p the paths a unit of thickness of crowns by themselves (src/physics/forest.rs, Known), and paths
-// grow on from there to x.
+// grow on from there to x; the sky's light, where as much stands on the sky's path; and coverage, where as much stands at all.
 #include "physics/forest.glsl"
 #include "physics/handover.glsl"
 
@@ -29,7 +29,8 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
     const bool mixed = SPECIES_COUNT > 1u;
     float total = 0.0;
     vec2 alone[MAX_SPECIES];
-    vec3 all = vec3(0.0); // paths of the pattern's trees by themselves, and the view's of all
+    vec3 all = vec3(0.0); // paths of the pattern's trees by themselves and their thickness
+    float sky = 0.0;      // the sky's path of all
     for (uint k = 0u; k < SPECIES_COUNT; k++) {
         // Next to ground without trees there are some: the mix must be defined everywhere.
         thickness[k] += 1e-4;
@@ -37,16 +38,17 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         if (!mixed) continue;
         alone[k] = table_alone(pair_table, view_table, slope_of(v, n, k), float(k), TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES);
         vec2 path = thickness[k] * alone[k];
-        all += vec3(species.items[k].listed_density > 0.0 ? vec2(0.0) : path, path.x);
+        all += species.items[k].listed_density > 0.0 ? vec3(0.0) : vec3(path, thickness[k]);
+        sky += thickness[k] * species.items[k].sky_path;
     }
     for (uint k = 0u; k < SPECIES_COUNT; k++) {
         Species s = species.items[k];
         float x = thickness[k], share = x / total;
-        TableKnown known = TableKnown(x, x, x);
+        TableKnown known = TableKnown(x, x, x, x);
         if (mixed) {
             // Listed trees keep apart from none, but they are themselves there.
-            vec2 own = s.listed_density > 0.0 ? vec2(x) : vec2(0.0);
-            known = TableKnown(all.x / alone[k].x + own.x, PAIR_TABLES ? all.y / alone[k].y + own.y : 0.0, all.z / alone[k].x);
+            float own = s.listed_density > 0.0 ? x : 0.0;
+            known = TableKnown(all.x / alone[k].x + own, PAIR_TABLES ? all.y / alone[k].y + own : 0.0, sky / s.sky_path, all.z + own);
         }
         TableForest t = table_forest(pair_table, view_table, slope_of(v, n, k), total, known, s.max_thickness, float(k),
                                      TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES, mixed);
@@ -56,12 +58,12 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         f.converged += path * converged(relative, view.v.convergence);
         f.seen_coverage += share * t.coverage;
         // As many trees as stand on a metre of the slope.
-        float grown = x / min(known.light, s.max_thickness), steep = x * n.z / min(known.light * n.z, s.max_thickness);
+        float grown = x / min(known.discs, s.max_thickness), steep = x * n.z / min(known.sky * n.z, s.max_thickness);
         f.sky -= steep * log(max(t.ground.x, 1e-6));
         f.gap -= grown * log(max(1.0 - t.ground.y, 1e-6));
         // Where nothing is handed over yet no tree is shown, but the mix must stay defined.
         float weight = max(part, 1e-6 * path);
-        vec3 leaf = (0.5 * sky_over_slope(n.z, known.light)) * s.albedo * view.v.sky_radiance;
+        vec3 leaf = (0.5 * sky_over_slope(n.z, known.sky)) * s.albedo * view.v.sky_radiance;
         f.tree_sky += weight * leaf * (t.sky.x + t.sky.y * s.bark_ratio);
         if (PAIR_TABLES) {
             f.joint += share * t.joint;
