@@ -293,6 +293,8 @@ struct ForestNode {
     float seen_coverage;              // mean coverage by discs where ground is seen
     float sky;                        // -ln D over the thickness
     float gap;                        // -ln(1 - C) over the thickness
+    float middle;                     // height above the ground of the middle of crowns, m
+    float half_depth;                 // from there to their upper end, m
 };
 
 // What the terrain takes.

@@ -8,6 +8,7 @@ layout(constant_id = 1) const uint COVER_SIDE = 256u;        // texels along a s
 // A place in a coverage tile.
 struct CoverPoint {
     vec3 at;          // texture coordinates in the tile, and least mip level
+    float scale;      // of them a metre
     float disc;       // log2 of the mean disc area in texels of mip 0
     uint layer;       // first layer
     float footprint;  // log2 of the texture coordinates that a pixel spans along its longer side
@@ -19,13 +20,18 @@ struct Cover {
     vec4 channels[COVER_GROUPS];      // coverage as stored, then density times mean area of each species
 };
 
+// Level of detail of a pixel.
+float cover_lod(CoverPoint place) { return max(place.footprint + log2(float(COVER_SIDE)) + view.v.footprint, place.at.z); }
+
+// Width of a texel of it, in texels of mip 0.
+float cover_texel(CoverPoint place) { return exp2(min(cover_lod(place), 3.0)); }
+
 // The tile's level of detail follows the pixel's footprint. Where a quad morphs to its parent's shape the least level
 // rises to 1, where the parent's tile takes over at its level 0 with the same texels: nothing changes when quads do.
 Cover cover(CoverPoint place) {
     Cover c;
     for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] = vec4(0.0);
-    float footprint = place.footprint + log2(float(COVER_SIDE)) + view.v.footprint;
-    float lod = max(footprint, place.at.z);
+    float lod = cover_lod(place);
     for (uint g = 0u; 4u * g < COVER_CHANNELS; g++) {
         c.channels[g] = textureLod(cover_tiles, vec3(place.at.xy, float(place.layer + g)), min(lod, 3.0));
     }

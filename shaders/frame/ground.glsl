@@ -11,6 +11,7 @@ layout(push_constant) uniform Push { TerrainParameters p; };
 #include "forest/expected.glsl"
 #include "frame/cover.glsl"
 #include "physics/handover.glsl"
+#include "physics/lift.glsl"
 layout(constant_id = 5) const bool HAS_SUN = true;
 layout(constant_id = 6) const bool SHADOWED = true; // within reach of a cascade
 
@@ -23,7 +24,7 @@ struct GroundPoint {
     vec4 tree_sun;      // radiance of the shader-map's trees from the sun; w: their lit fraction
     vec4 tree_sky;      // from the sky; w: nu
     vec4 paths;         // over, seen, joint; w: coverage where ground is seen
-    vec2 vertical;      // sky, gap
+    vec4 vertical;      // sky, gap; middle and half depth of crowns
 };
 
 struct GroundLight {
@@ -51,25 +52,44 @@ vec3 ground_normal(vec2 slope_at, uint layer) {
     return normalize(vec3(-textureLod(slope_tiles, vec3(slope_at, float(layer)), 0.0).rg, 1.0));
 }
 
+// A place some metres from that of a point, on the map; n is the ground's normal there. Whoever includes this defines it.
+CoverPoint moved(GroundPoint from, vec2 by, vec3 n);
+
+// What trees cover of the ground under a ray while it is among the crowns.
+Cover cover_under(GroundPoint from, vec3 ray, vec3 n) {
+    vec2 middle = lifted(ray, n, from.vertical.z), way = lifted(ray, n, from.vertical.w);
+    uint count = lift_count(2.0 * from.cover.scale * length(way) * float(COVER_SIDE) / cover_texel(from.cover));
+    Cover c = cover(moved(from, middle + way * lift_height(0u, count), n));
+    for (uint k = 1u; k < count; k++) {
+        Cover next = cover(moved(from, middle + way * lift_height(k, count), n));
+        for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] += next.channels[g];
+    }
+    for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] /= float(count);
+    return c;
+}
+
 // Ground and, where trees are not drawn one by one, the trees on it (BN12, eq. 11-13 and 24-27).
 GroundLight ground_light(GroundPoint at, vec3 n) {
     vec2 world = (vec2(view.v.grid_camera) * p.step + view.v.grid_offset + at.position.xy) / p.extent;
     vec3 reflectance = textureLod(albedo, vec3(world.x, 1.0 - world.y, 0.0), 0.0).rgb;
     float distance = length(at.position);
     float cosine = max(dot(n, view.v.sun_direction), 0.0);
-    Cover c = cover(at.cover);
+    vec3 v = at.position * (-1.0 / max(distance, 1e-6));
+    Cover c = cover(at.cover), between = cover_under(at, v, n);
+    float shading = HAS_SUN ? total_thickness(cover_under(at, view.v.sun_direction, n).channels) : 0.0;
     // What the nodes know per thickness, times the pixel's own.
-    float thickness = total_thickness(c.channels);
+    float thickness = total_thickness(between.channels);
     float expected = 1.0 - exp(-thickness * at.vertical.y);
     // Interpolation rounds beyond the values at the vertices.
     float nu = thickness > 0.0 ? clamp(at.tree_sky.w, 0.0, 1.0) : 0.0, trees_lit = clamp(at.tree_sun.w, 0.0, 1.0);
-    float ground_lit = exp(thickness * min(at.paths.y - at.paths.z, 0.0));
+    float ground_lit = exp(shading * min(at.paths.y - at.paths.z, 0.0));
     GroundLight g;
-    g.coverage = mix(expected, c.channels[0].x, c.resolved);
+    g.coverage = mix(1.0 - exp(-total_thickness(c.channels) * at.vertical.y), c.channels[0].x, c.resolved);
+    float crowns = mix(expected, between.channels[0].x, between.resolved);
     float lit = HAS_SUN ? mix(shadow_maps(at.position, n, cosine, distance), ground_lit, nu) : 0.0;
     // Around the mean of the ground that is seen, so that light is the same at every distance.
     float contrast = mix(ground_contrast(g.coverage, at.paths.w, view.v.ground_contrast), 1.0, nu);
-    float open = open_ground(thickness * at.paths.x, at.paths.x / max(at.paths.y, 1e-9), g.coverage, expected);
+    float open = open_ground(thickness * at.paths.x, at.paths.x / max(at.paths.y, 1e-9), crowns, expected);
     vec3 sun = reflectance * (cosine * lit / PI) * view.v.sun_irradiance;
     vec3 sky = reflectance * (ground_sky(n.z, exp(-thickness * at.vertical.x), thickness) * contrast) * view.v.sky_radiance;
     g.sun = mix(max(at.tree_sun.rgb, 0.0), sun, open);

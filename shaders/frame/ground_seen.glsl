@@ -28,7 +28,38 @@ TerrainQuad fetch_quad(uint quad) {
 ForestNode fetch_node(uint quad, ivec2 node) {
     int at = (int(quad * FOREST_NODES * FOREST_NODES) + node.y * int(FOREST_NODES) + node.x) * 4;
     vec4 a = texelFetch(nodes, at), b = texelFetch(nodes, at + 1), c = texelFetch(nodes, at + 2), d = texelFetch(nodes, at + 3);
-    return ForestNode(a.xyz, a.w, b.xyz, b.w, c.x, c.y, c.z, c.w, d.x, d.y);
+    return ForestNode(a.xyz, a.w, b.xyz, b.w, c.x, c.y, c.z, c.w, d.x, d.y, d.z, d.w);
+}
+
+// Where in its square of ground, in [0, 1], a quad has a position from the camera, and how far it has morphed there.
+vec3 place_of(TerrainQuad q, vec3 position) {
+    vec2 cells = (vec2(view.v.grid_camera - q.corner) + (position.xy + view.v.grid_offset) / p.step) / float(q.spacing);
+    return vec3(cells / float(TERRAIN_CELLS), smoothstep(q.morph.x, q.morph.y, length(position)));
+}
+
+// The same in its coverage tile; `spans` are the metres that a pixel does along its longer side.
+CoverPoint cover_point(TerrainQuad q, vec3 place, float spans) {
+    float scale = q.cover_scale / (p.step * float(q.spacing) * float(TERRAIN_CELLS));
+    return CoverPoint(vec3(q.cover_offset + q.cover_scale * place.xy, q.cover_floor * place.z), scale, q.cover_disc, q.cover_layer,
+                      spans + log2(scale));
+}
+
+// Beyond the border of the point's tile it is in that of the quad that is seen there, if any is; else as on the border.
+CoverPoint moved(GroundPoint from, vec2 by, vec3 n) {
+    CoverPoint c = from.cover;
+    c.at.xy += c.scale * by;
+    if (all(equal(c.at.xy, clamp(c.at.xy, 0.0, 1.0)))) return c;
+    vec2 size = vec2(picture_size());
+    Camera camera = camera_of(view.v, size);
+    vec3 position = from.position + vec3(by, -dot(n.xy, by) / n.z);
+    float distance = dot(position, camera.forward);
+    ivec2 pixel = ivec2(floor(0.5 * size + vec2(dot(position, camera.x), dot(position, camera.y)) / distance));
+    if (distance <= 0.0 || any(notEqual(pixel, clamp(pixel, ivec2(0), ivec2(size) - 1)))) return c;
+    uint other = ground_quad(pixel, 0);
+    if (other == 0u) return c;
+    TerrainQuad q = fetch_quad(other - 1u);
+    CoverPoint there = cover_point(q, place_of(q, position), from.cover.footprint - log2(from.cover.scale));
+    return all(equal(there.at.xy, clamp(there.at.xy, 0.0, 1.0))) ? there : c;
 }
 
 // A point of a quad's ground; `ray` goes through it, with 1 along the camera's axis, and `distance` is its own along that.
@@ -36,24 +67,22 @@ GroundPoint point_of(uint index, vec3 position, vec3 ray, float distance, Camera
     TerrainQuad q = fetch_quad(index);
     float cell = float(q.spacing);
     // Cells from the quad's corner. The last before the end of the terrain is narrower than the others, of the same slopes.
-    vec2 at = (vec2(view.v.grid_camera - q.corner) + (position.xy + view.v.grid_offset) / p.step) / cell;
+    vec3 place = place_of(q, position);
+    vec2 at = place.xy * float(TERRAIN_CELLS);
     vec2 whole = clamp(floor(at), vec2(0.0), vec2(float(TERRAIN_CELLS - 1u)));
     vec2 width = max(min((p.last - vec2(q.corner)) / cell - whole, 1.0), 1e-3);
     vec2 within = (whole + clamp((at - whole) / width, 0.0, 1.0)) / float(TERRAIN_CELLS);
-    vec2 place = at / float(TERRAIN_CELLS);
-    float morph = smoothstep(q.morph.x, q.morph.y, length(position));
     GroundPoint g;
     g.position = position;
     g.slope_at = (within * float(TERRAIN_SLOPES - 1u) + 0.5) / float(TERRAIN_SLOPES);
     g.layer = q.layer;
     n = ground_normal(g.slope_at, g.layer);
     // Where the neighbouring pixels' rays meet the plane through the point: no more grazing than a hundredth of a pixel's slope.
-    float facing = max(-dot(n, ray), 1e-4), scale = q.cover_scale / (p.step * cell * float(TERRAIN_CELLS));
+    float facing = max(-dot(n, ray), 1e-4);
     vec3 right = camera.right + ray * (dot(n, camera.right) / facing), down = camera.down + ray * (dot(n, camera.down) / facing);
-    g.cover = CoverPoint(vec3(q.cover_offset + q.cover_scale * place, q.cover_floor * morph), q.cover_disc, q.cover_layer,
-                         cover_footprint(right.xy * (scale * distance), down.xy * (scale * distance)));
+    g.cover = cover_point(q, place, cover_footprint(right.xy * distance, down.xy * distance));
     g.tree_sun = g.tree_sky = g.paths = vec4(0.0);
-    g.vertical = vec2(0.0);
+    g.vertical = vec4(0.0);
     if (COVER_CHANNELS > 0u) {
         vec2 node = clamp(within, 0.0, 1.0) * float(FOREST_NODES - 1u);
         ivec2 low = ivec2(min(floor(node), float(FOREST_NODES - 2u)));
@@ -63,7 +92,7 @@ GroundPoint point_of(uint index, vec3 position, vec3 ray, float distance, Camera
         g.tree_sun = vec4(m.tree_sun, m.tree_lit);
         g.tree_sky = vec4(m.tree_sky, m.converged);
         g.paths = vec4(m.over, m.seen, m.joint, m.seen_coverage);
-        g.vertical = vec2(m.sky, m.gap);
+        g.vertical = vec4(m.sky, m.gap, m.middle, m.half_depth);
     }
     return g;
 }

@@ -25,7 +25,7 @@ TableSlope slope_of(vec3 v, vec3 n, uint k) {
 
 // What is seen along v (unit, to the viewer) of a slope of normal n; thickness is density times mean area of each species.
 ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIES]) {
-    ForestNode f = ForestNode(vec3(0.0), 0.0, vec3(0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    ForestNode f = ForestNode(vec3(0.0), 0.0, vec3(0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     const bool mixed = SPECIES_COUNT > 1u;
     float total = 0.0;
     vec2 alone[MAX_SPECIES];
@@ -55,6 +55,10 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         float path = share * t.seen, relative = relative_distance(distance, s.range), part = path * handed_over(relative);
         f.seen += path;
         f.over += part;
+        // Its crowns are from where there is not only bark to the top.
+        float scale = 0.5 * (s.scale_range.x + s.scale_range.y), crown = 0.5 * s.scale_to_metres.z;
+        f.middle += path * scale * (s.centre + crown * (1.0 + s.bare_below));
+        f.half_depth += path * scale * crown * (1.0 - s.bare_below);
         f.converged += path * converged(relative, view.v.convergence);
         f.seen_coverage += share * t.coverage;
         // As many trees as stand on a metre of the slope.
@@ -79,6 +83,8 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
     f.tree_sky *= inverse;
     f.tree_lit *= inverse;
     f.converged /= f.seen;
+    f.middle /= f.seen;
+    f.half_depth /= f.seen;
     inverse = 1.0 / total;
     f.over *= inverse;
     f.seen *= inverse;
