@@ -55,9 +55,9 @@ vec3 ground_normal(vec2 slope_at, uint layer) {
 // A place some metres from that of a point, on the map; n is the ground's normal there. Whoever includes this defines it.
 CoverPoint moved(GroundPoint from, vec2 by, vec3 n);
 
-// What trees cover of the ground under a ray while it is among the crowns.
-Cover cover_under(GroundPoint from, vec3 ray, vec3 n) {
-    vec2 middle = lifted(ray, n, from.vertical.z), way = lifted(ray, n, from.vertical.w);
+// What trees cover of the ground under a ray while it is from `low` to `high` above where it would be on it.
+Cover cover_under(GroundPoint from, vec3 ray, vec3 n, float low, float high) {
+    vec2 middle = lifted(ray, n, 0.5 * (low + high)), way = lifted(ray, n, 0.5 * (high - low));
     uint count = lift_count(2.0 * from.cover.scale * length(way) * float(COVER_SIDE) / cover_texel(from.cover));
     Cover c = cover(moved(from, middle + way * lift_height(0u, count), n));
     for (uint k = 1u; k < count; k++) {
@@ -75,8 +75,9 @@ GroundLight ground_light(GroundPoint at, vec3 n) {
     float distance = length(at.position);
     float cosine = max(dot(n, view.v.sun_direction), 0.0);
     vec3 v = at.position * (-1.0 / max(distance, 1e-6));
-    Cover c = cover(at.cover), between = cover_under(at, v, n);
-    float shading = HAS_SUN ? total_thickness(cover_under(at, view.v.sun_direction, n).channels) : 0.0;
+    float low = at.vertical.z - at.vertical.w, high = at.vertical.z + at.vertical.w; // where crowns begin and end
+    Cover c = cover(at.cover), between = cover_under(at, v, n, low, high);
+    float shading = HAS_SUN ? total_thickness(cover_under(at, view.v.sun_direction, n, low, high).channels) : 0.0;
     // What the nodes know per thickness, times the pixel's own.
     float thickness = total_thickness(between.channels);
     float expected = 1.0 - exp(-thickness * at.vertical.y);

@@ -1,4 +1,4 @@
-// Light on the ground where samples see it, once a pixel, and the sky behind. One workgroup a tile of 8 x 8 pixels: every invocation
+// Light on the ground where samples see it, once a pixel, and the sky behind, before which trees stand where the ground ends. One workgroup a tile of 8 x 8 pixels: every invocation
 // lists the pixels of its column that see ground; then the list is shaded by all in turn.
 #include "frame/ground.glsl"
 #include "frame/camera.glsl"
@@ -97,42 +97,8 @@ GroundPoint point_of(uint index, vec3 position, vec3 ray, float distance, Camera
     return g;
 }
 
-shared uint items[8u * TILE_SIDE]; // pixels of each column that see ground: its row | samples << 8 | open samples << 16
-
-Shown sky_at(ivec2 pixel) {
-    if (SKY_IMAGE) return load_pixel(pixel);
-    return shown_sky(view.v.sky_radiance);
-}
-
-// Lists the pixels of this invocation's column that see ground. Where others see the sky, that is all that they do.
-void list_pixels(uvec2 corner, uint column, uvec2 size) {
-    uint count = 0u;
-    for (uint row = 0u; row < TILE_SIDE; row++) {
-        uvec2 pixel = min(corner + uvec2(column, row), size - 1u);
-        bool inside = pixel == corner + uvec2(column, row);
-        int at = int((pixel.y * size.x + pixel.x) * SAMPLES);
-        uint open = (1u << SAMPLES) - 1u, samples = 0u;
-        for (uint k = 0u; k < SAMPLES; k++) {
-            if (TREES) open &= texelFetch(trees_seen, at + int(k)).x != 0u ? ~(1u << k) : ~0u;
-            samples |= ground_quad(ivec2(pixel), int(k)) != 0u ? 1u << k : 0u;
-        }
-        samples &= open;
-        if (inside && samples != 0u) {
-            items[column * TILE_SIDE + count] = row | samples << 8u | open << 16u;
-            count++;
-        }
-        if (inside && samples == 0u && open != 0u && (!SKY_IMAGE || open + 1u != 1u << SAMPLES)) {
-            store_pixel(ivec2(pixel), scaled(sky_at(ivec2(pixel)), float(bitCount(open)) / float(SAMPLES)));
-        }
-        if (inside && (open & 1u) != 0u) store_first(ivec2(pixel), 0u, ground_depth(ivec2(pixel), 0));
-    }
-    counts[column] = count;
-}
-
-// The ground that a pixel's samples see; `seen` are they.
-Shown ground_at(ivec2 pixel, uint seen, vec2 size) {
-    Camera camera = camera_of(view.v, size);
-    // The mean of what samples see of the first one's quad.
+// What a pixel's samples see of the ground: the mean of what they do of the first one's quad. `seen` are they.
+GroundPoint point_at(ivec2 pixel, uint seen, vec2 size, Camera camera, out vec3 n) {
     uint quad = 0u;
     vec3 sum = vec3(0.0);
     float count = 0.0;
@@ -145,9 +111,111 @@ Shown ground_at(ivec2 pixel, uint seen, vec2 size) {
         sum += counts ? depth * (camera.forward + offset.x * camera.right + offset.y * camera.down) : vec3(0.0);
         count += counts ? 1.0 : 0.0;
     }
-    vec3 position = sum / count, n;
+    vec3 position = sum / count;
     float distance = dot(position, camera.forward);
-    GroundPoint at = point_of(quad - 1u, position, position / distance, distance, camera, n);
+    return point_of(quad - 1u, position, position / distance, distance, camera, n);
+}
+
+// Samples that the ground covers, whatever is before it.
+uint ground_samples(ivec2 pixel) {
+    uint samples = 0u;
+    for (uint k = 0u; k < SAMPLES; k++) samples |= ground_quad(pixel, int(k)) != 0u ? 1u << k : 0u;
+    return samples;
+}
+
+const uint EDGE_ROWS = 6u; // how far trees that are not drawn one by one stand out from where the ground ends, pixels
+const bool EDGES = COVER_CHANNELS > 0u;
+
+// How many rows below a pixel of the sky the ground ends, or more than EDGE_ROWS. Trees that stand out there are drawn one by one where
+// ridges are looked for.
+uint edge_below(ivec2 pixel, ivec2 size) {
+    if (!EDGES || VIEW_MODE != 0u || view.v.silhouette_ratio > 1.0) return EDGE_ROWS + 1u;
+    uint row = 0u;
+    while (row <= EDGE_ROWS && (pixel.y + int(row) >= size.y || ground_samples(pixel + ivec2(0, row)) == 0u)) row++;
+    return row;
+}
+
+Shown sky_at(ivec2 pixel) {
+    if (SKY_IMAGE) return load_pixel(pixel);
+    return shown_sky(view.v.sky_radiance);
+}
+
+// The highest of a pixel's samples of the ground.
+uint highest(uint samples) {
+    uint found = samples & -samples;
+    for (uint k = 0u; k < SAMPLES; k++) {
+        bool higher = sample_offset(k, SAMPLES).y < sample_offset(findLSB(found), SAMPLES).y;
+        if ((samples >> k & 1u) != 0u && higher) found = 1u << k;
+    }
+    return found;
+}
+
+// Share of what a sight line along `ray` sees that are trees, above the ground's end at a point of normal n.
+float standing_out(GroundPoint at, vec3 n, vec3 ray, float distance) {
+    float above = max(dot(ray * distance - at.position, n) / n.z, 0.0);
+    float low = max(at.vertical.z - at.vertical.w - above, 0.0), high = at.vertical.z + at.vertical.w - above;
+    if (high <= low) return 0.0;
+    float thickness = total_thickness(cover_under(at, -normalize(ray), n, low, high).channels);
+    return 1.0 - exp(-thickness * at.paths.x * (high - low) / (2.0 * at.vertical.w));
+}
+
+// The sky that samples `seen` see, and the trees before it that stand where the ground ends, some rows below.
+Shown sky_beyond(ivec2 pixel, uint seen, ivec2 size) {
+    Shown sky = sky_at(pixel);
+    uint row = edge_below(pixel, size);
+    if (row > EDGE_ROWS) return sky;
+    Camera camera = camera_of(view.v, vec2(size));
+    ivec2 edge = pixel + ivec2(0, row);
+    vec3 n;
+    GroundPoint at = point_at(edge, highest(ground_samples(edge)), vec2(size), camera, n);
+    float distance = dot(at.position, camera.forward), trees = 0.0;
+    for (uint k = 0u; k < SAMPLES; k++) {
+        if ((seen >> k & 1u) == 0u) continue;
+        vec2 offset = vec2(pixel) + 0.5 + sample_offset(k, SAMPLES) - 0.5 * vec2(size);
+        trees += standing_out(at, n, camera.forward + offset.x * camera.right + offset.y * camera.down, distance);
+    }
+    trees /= float(bitCount(seen));
+    vec3 sun = trees * max(at.tree_sun.rgb, 0.0), from_sky = trees * max(at.tree_sky.rgb, 0.0);
+#ifdef LAYERS
+    float lit = clamp(at.tree_sun.w, 0.0, 1.0);
+    return sum(scaled(sky, 1.0 - trees), Shown(vec4(sun, trees), vec4(from_sky, trees), vec4(0.0, 0.0, trees * vec2(lit, 1.0 - lit))));
+#else
+    return sum(scaled(sky, 1.0 - trees), Shown(vec4(sun + from_sky, trees)));
+#endif
+}
+
+shared uint items[8u * TILE_SIDE]; // pixels of each column to shade: its row | samples of the ground << 8 | open samples << 16
+
+// Lists the pixels of this invocation's column that see ground, or sky where it ends. Where others see the sky, that is all that they do.
+void list_pixels(uvec2 corner, uint column, uvec2 size) {
+    uint count = 0u;
+    for (uint row = 0u; row < TILE_SIDE; row++) {
+        uvec2 pixel = min(corner + uvec2(column, row), size - 1u);
+        bool inside = pixel == corner + uvec2(column, row);
+        int at = int((pixel.y * size.x + pixel.x) * SAMPLES);
+        uint open = (1u << SAMPLES) - 1u, samples = 0u;
+        for (uint k = 0u; k < SAMPLES; k++) {
+            if (TREES) open &= texelFetch(trees_seen, at + int(k)).x != 0u ? ~(1u << k) : ~0u;
+        }
+        samples = ground_samples(ivec2(pixel));
+        bool edge = (open & ~samples) != 0u && edge_below(ivec2(pixel), ivec2(size)) <= EDGE_ROWS;
+        samples &= open;
+        if (inside && (samples != 0u || edge)) {
+            items[column * TILE_SIDE + count] = row | samples << 8u | open << 16u;
+            count++;
+        }
+        if (inside && samples == 0u && !edge && open != 0u && (!SKY_IMAGE || open + 1u != 1u << SAMPLES)) {
+            store_pixel(ivec2(pixel), scaled(sky_at(ivec2(pixel)), float(bitCount(open)) / float(SAMPLES)));
+        }
+        if (inside && (open & 1u) != 0u) store_first(ivec2(pixel), 0u, ground_depth(ivec2(pixel), 0));
+    }
+    counts[column] = count;
+}
+
+// The ground that a pixel's samples see; `seen` are they.
+Shown ground_at(ivec2 pixel, uint seen, vec2 size) {
+    vec3 n;
+    GroundPoint at = point_at(pixel, seen, size, camera_of(view.v, size), n);
     GroundLight g = ground_light(at, n);
 #ifdef LAYERS
     return Shown(vec4(g.sun, 1.0), vec4(g.sky, g.trees), g.fractions);
@@ -166,9 +234,11 @@ void main() {
     for (uint i = column; i < total; i += 8u) {
         uint slot = item_slot(i, TILE_SIDE), found = items[slot];
         ivec2 pixel = ivec2(corner + uvec2(slot / TILE_SIDE, found & 0xffu));
-        uint seen = found >> 8u & 0xffu, sky = found >> 16u & ~seen;
+        uint seen = found >> 8u & 0xffu, sky = found >> 16u & ~ground_samples(pixel);
         float part = 1.0 / float(SAMPLES);
-        Shown ground = scaled(ground_at(pixel, seen, vec2(size)), part * float(bitCount(seen)));
-        store_pixel(pixel, sum(ground, scaled(sky_at(pixel), part * float(bitCount(sky)))));
+        Shown shown = shown_nothing();
+        if (seen != 0u) shown = scaled(ground_at(pixel, seen, vec2(size)), part * float(bitCount(seen)));
+        if (sky != 0u) shown = sum(shown, scaled(sky_beyond(pixel, sky, ivec2(size)), part * float(bitCount(sky))));
+        store_pixel(pixel, shown);
     }
 }
