@@ -49,10 +49,10 @@ vec2 table_alone(sampler3D pairs, sampler2DArray views, TableSlope t, float spec
     return path;
 }
 
-// Thicknesses of forests of one species alone, at which its tables are read: the view's path; that of view and light together, and
+// Thicknesses of forests of one species alone, at which its tables are read: the view's path; that of view and light together;
 // what is lit of trees; the sky's light; and coverage by discs. All are x where the species stands alone.
 struct TableKnown {
-    float seen, joint, sky, discs;
+    float seen, joint, light, sky, discs;
 };
 
 // How far beyond the last node a thickness is, in its own. Paths grow on there as they did up to it, and the sky's light falls on.
@@ -87,11 +87,13 @@ TableForest table_forest(sampler3D pairs, sampler2DArray views, TableSlope t, fl
     if (lit) {
         vec4 p = table_pair(pairs, at_s, table_density(known.joint, x_max, m), species, count, m);
         vec4 ps = table_pair(pairs, at_s, 0.0, species, count, m), pu = table_pair(pairs, at_u, 0.0, species, count, m);
+        vec4 q = mixed ? table_pair(pairs, at_s, table_density(known.light, x_max, m), species, count, m) : p;
         float w = grown_path(p.x, ps.x, table_beyond(known.joint, x_max));
         f.joint = max(x * (t.s.sec_v * t.view_path + t.s.sec_l * t.light_path) * w, f.seen);
-        float change = lit_of_seen(f.seen, f.joint) * (pu.y + pu.z) / max(ps.y + ps.z, 1e-3);
-        f.sun = p.yz * min(change, 1.0 / max(p.y + p.z, 1e-6));
-        f.transfer = p.w * (pu.w / max(ps.w, 1e-3));
+        float above = mixed ? known.light / known.joint : 1.0;
+        float change = lit_of_seen(f.seen * above, f.joint * above) * (pu.y + pu.z) / max(ps.y + ps.z, 1e-3);
+        f.sun = q.yz * min(change, 1.0 / max(q.y + q.z, 1e-6));
+        f.transfer = q.w * (pu.w / max(ps.w, 1e-3));
     }
     return f;
 }

@@ -17,8 +17,9 @@
 //! Against the reference, an oak forest on a slope of 30° away from a sun at 45°: rms 3.6 %, where the turn leaves 9.4 %.
 //!
 //! # Mixes
-//! Each species knows forests of its own only. What of a mix they are read at is told at [`Known::in_mix`].
+//! Each species knows forests of its own only. What of a mix they are read at is told at [`mix`].
 
+use super::strata::{Layer, Stratum, above_one_layer, strata};
 use super::tables::{Angles, ForestTables, angles, ground, lit_of_seen, pair, seen_sky, view};
 
 /// Thicknesses of the last node that optical paths grow on for beyond it.
@@ -69,8 +70,10 @@ pub fn sky_path(t: &ForestTables) -> f64 {
 pub struct Known {
     /// Of which the view's path is read,
     pub seen: f64,
-    /// that of view and light together and what is lit of trees,
+    /// that of view and light together,
     pub joint: f64,
+    /// what is lit of trees,
+    pub light: f64,
     /// the sky's light,
     pub sky: f64,
     /// and coverage by discs.
@@ -80,31 +83,64 @@ pub struct Known {
 impl Known {
     /// Where the species stands alone.
     pub fn own(x: f64) -> Self {
-        Known { seen: x, joint: x, sky: x, discs: x }
+        Known { seen: x, joint: x, light: x, sky: x, discs: x }
     }
+}
 
-    /// Of species `k` in a mix of thicknesses `x`, paths [`alone`] p, [`sky_path`]s `sky`, and whether positions are listed, not of the
-    /// pattern.
-    ///
-    /// Trees of the pattern keep apart: to second order in the densities, the path of a mix is Σ_i x_i p_i + ½ Σ_ij x_i x_j O_ij, where O
-    /// is p_i p_j if no two crowns on it share a line, and less where they are larger than their room. A forest of species k alone
-    /// of thickness x'_k has as much of that a tree where x'_k = Σ_j x_j p_j / p_k. (Of acacias with poplars, and of ashes with
-    /// spruces, half and half, paths were 0.07 and 0.19 more than those of each by itself; that of acacias alone of twice the density
-    /// 0.19, of poplars 0.03, of ashes 0.11, of spruces 0.45 more than twice: O_ij is near √(O_ii O_jj).) Listed trees keep apart from none.
-    ///
-    /// The sky's light comes down by another way than the view's: it is read where as much stands on that. Discs are as thick as they are
-    /// wide.
-    pub fn in_mix(k: usize, x: &[f64], alone: &[[f64; 2]], sky: &[f64], listed: &[bool]) -> Self {
-        let apart = |path: &dyn Fn(usize) -> f64| -> f64 {
-            (0..x.len()).filter(|j| *j == k || !listed[*j]).map(|j| x[j] * path(j) / path(k)).sum()
+/// A species in a mix.
+#[derive(Clone, Copy, Debug)]
+pub struct Member {
+    /// Its thickness x.
+    pub thickness: f64,
+    /// Its paths [`alone`], p.
+    pub alone: [f64; 2],
+    /// Its [`sky_path`].
+    pub sky: f64,
+    /// Heights between which its crowns are, m.
+    pub crowns: [f64; 2],
+    /// Whether its trees are listed, not of the pattern.
+    pub listed: bool,
+}
+
+/// Where the tables of each species of a mix are read, and which share of what is seen of trees is its own.
+///
+/// Trees of the pattern keep apart: to second order in the densities, the path of a mix is Σ_i x_i p_i + ½ Σ_ij x_i x_j O_ij, where O
+/// is p_i p_j if no two crowns on it share a line, and less where they are larger than their room. A forest of species k alone
+/// of thickness x'_k has as much of that a tree where x'_k = Σ_j x_j p_j / p_k. (Of acacias with poplars, and of ashes with
+/// spruces, half and half, paths were 0.07 and 0.19 more than those of each by itself; that of acacias alone of twice the density
+/// 0.19, of poplars 0.03, of ashes 0.11, of spruces 0.45 more than twice: O_ij is near √(O_ii O_jj).) Listed trees keep apart from none.
+///
+/// Light is read where as much stands above what is seen of species k as does in its own forest ([`super::strata`]): on the
+/// sun's way, Σ_j x_j p_j / p_k B_k/B, and on the sky's, which is another than the view's, with its paths. Discs are as thick as they are wide.
+pub fn mix(members: &[Member]) -> Vec<(Known, f64)> {
+    let layer = |m: &Member| Layer {
+        low: m.crowns[0],
+        high: m.crowns[1],
+        seen: m.thickness * m.alone[0],
+        light: m.thickness * (m.alone[1] - m.alone[0]).max(0.0),
+        sky: m.thickness * m.sky,
+    };
+    let layers: Vec<Layer> = members.iter().map(layer).collect();
+    let all = |path: fn(&Layer) -> f64| layers.iter().map(path).sum::<f64>();
+    let even = above_one_layer(all(|l| l.seen));
+    let above = |stratum: f64, all: f64| stratum / (all * even).max(1e-6);
+    let known = |(k, stratum): (usize, Stratum)| {
+        let own = &members[k];
+        let apart = |path: fn(&Member) -> f64| -> f64 {
+            let of = members.iter().enumerate().filter(|(j, m)| *j == k || !m.listed);
+            of.map(|(_, m)| m.thickness * path(m) / path(own)).sum()
         };
-        Known {
-            seen: apart(&|j| alone[j][0]),
-            joint: apart(&|j| alone[j][1]),
-            sky: x.iter().zip(sky).map(|(x, path)| x * path / sky[k]).sum(),
-            discs: apart(&|_| 1.0),
-        }
-    }
+        let joint = apart(|m| m.alone[1]);
+        let known = Known {
+            seen: apart(|m| m.alone[0]),
+            joint,
+            light: joint * above(stratum.light, all(|l| l.light)),
+            sky: all(|l| l.sky) / own.sky * above(stratum.sky, all(|l| l.sky)),
+            discs: apart(|_| 1.0),
+        };
+        (known, stratum.share)
+    };
+    strata(&layers).into_iter().enumerate().map(known).collect()
 }
 
 /// Angles on a slope of unit normal n and on level ground, and what single crowns' paths of view and light are over those of sheared ones.
@@ -123,15 +159,16 @@ pub fn forest(t: &ForestTables, v: [f64; 3], l: [f64; 3], n: [f64; 3], x: f64, k
     let (s, u, [view_path, light_path]) = sheared(t, v, l, n);
     let [v0, u0] = [&s, &u].map(|a| view(t, a.v, 0.0));
     let [_, leaf, bark, _] = view(t, s.v, known.sky);
-    let [joint, lit_leaf, lit_bark, transfer] = pair(t, s.v, s.l, s.phi, known.joint);
+    let [_, lit_leaf, lit_bark, transfer] = pair(t, s.v, s.l, s.phi, known.light);
     let [ps, pu] = [s, u].map(|a| pair(t, a.v, a.l, a.phi, 0.0));
     let beyond = |known: f64| (known / f64::from(t.max_thickness) - 1.0).clamp(0.0, MOST_BEYOND);
     let grown = |known: f64, full: f64, alone: f64| full + beyond(known) * (full - alone).max(0.0);
     let path = grown(known.seen, view(t, s.v, known.seen)[0], v0[0]);
-    let w = grown(known.joint, joint, ps[0]);
+    let w = grown(known.joint, pair(t, s.v, s.l, s.phi, known.joint)[0], ps[0]);
     let seen = x * s.sec_v * path * view_path;
     let joint = (x * (s.sec_v * view_path + s.sec_l * light_path) * w).max(seen);
-    let change = lit_of_seen(seen, joint) * (pu[1] + pu[2]) / (ps[1] + ps[2]).max(1e-3);
+    let above = known.light / known.joint;
+    let change = lit_of_seen(seen * above, joint * above) * (pu[1] + pu[2]) / (ps[1] + ps[2]).max(1e-3);
     let lit = change.min(1.0 / (lit_leaf + lit_bark).max(1e-6));
     let dimmer = ((leaf + bark) / (v0[1] + v0[2]).max(1e-3)).clamp(1e-3, 1.0);
     let sky = (u0[1] + u0[2]) / (v0[1] + v0[2]).max(1e-3) * dimmer.powf(beyond(known.sky));

@@ -11,6 +11,7 @@ pub mod masks;
 pub mod outline;
 pub mod raster;
 pub mod shadow;
+pub mod strata;
 pub mod tables;
 pub mod terrain;
 pub mod tonemap;

@@ -189,6 +189,12 @@ fn a_forest_far_away_is_what_the_tables_say() {
     gpu.close().unwrap();
 }
 
+/// Heights between which a species' crowns are, m: from where there is not only bark.
+fn crowns(row: &Species) -> [f64; 2] {
+    let scale = 0.5 * (row.scale_range[0] + row.scale_range[1]);
+    [row.bare_below, 1.0].map(|z| f64::from(scale * (row.centre + z * row.scale_to_metres[2])))
+}
+
 /// Fractions of a level mix of species, of `densities`, as the tables have them in f64.
 fn mixed(
     scene: &Scene,
@@ -198,20 +204,27 @@ fn mixed(
     v: [f64; 3],
 ) -> [f64; 4] {
     let (l, up) = (sun_direction(&scene.sun), [0.0, 0.0, 1.0]);
-    let x: Vec<f64> = densities.iter().zip(rows).map(|(d, r)| d * f64::from(r.mean_area)).collect();
-    let alone: Vec<[f64; 2]> = tables.iter().map(|t| forest::alone(t, v, l, up)).collect();
-    let sky: Vec<f64> = tables.iter().map(|t| forest::sky_path(t)).collect();
-    let listed: Vec<bool> = rows.iter().map(|r| r.listed_density > 0.0).collect();
-    let total: f64 = x.iter().sum();
-    let [mut seen, mut joint, mut lit] = [0.0; 3];
-    for (k, t) in tables.iter().enumerate() {
-        let f = forest::forest(t, v, l, up, total, forest::Known::in_mix(k, &x, &alone, &sky, &listed));
-        let share = x[k] / total;
+    let member = |(k, t): (usize, &Arc<ForestTables>)| forest::Member {
+        thickness: densities[k] * f64::from(rows[k].mean_area),
+        alone: forest::alone(t, v, l, up),
+        sky: forest::sky_path(t),
+        crowns: crowns(&rows[k]),
+        listed: rows[k].listed_density > 0.0,
+    };
+    let members: Vec<forest::Member> = tables.iter().enumerate().map(member).collect();
+    let total: f64 = members.iter().map(|m| m.thickness).sum();
+    let [mut seen, mut joint, mut lit, mut weights] = [0.0; 4];
+    for ((t, m), (known, stratum)) in tables.iter().zip(&members).zip(forest::mix(&members)) {
+        let f = forest::forest(t, v, l, up, total, known);
+        let share = m.thickness / total;
         seen += share * f.seen;
         joint += share * f.joint;
-        lit += share * f.seen * (f.sun[0] + f.sun[1]);
+        // What is seen of a species is as much as its layer says, of paths as its tables have them.
+        let weight = f.seen / m.alone[0] * stratum;
+        lit += weight * (f.sun[0] + f.sun[1]);
+        weights += weight;
     }
-    let (open, joint, lit) = ((-seen).exp(), (-joint).exp(), lit / seen);
+    let (open, joint, lit) = ((-seen).exp(), (-joint).exp(), lit / weights);
     [joint, open - joint, (1.0 - open) * lit, (1.0 - open) * (1.0 - lit)]
 }
 

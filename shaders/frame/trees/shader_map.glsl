@@ -3,12 +3,13 @@
 //
 // With x_i the thickness of species i (density times mean area), crowns of a Poisson distribution give P = exp(-sum x_i sec tv V_i),
 // so paths mix linearly; D and 1 - C, which fall about exponentially as well, mix as products; and what is seen of the trees is of
-// species i in proportion to x_i V_i. Trees keep apart, though, and V, W, T, E, D and C of a species are known for forests of it
+// species i as src/physics/strata.rs has it, where the taller hide the shorter. Trees keep apart, though, and V, W, T, E, D and C of a species are known for forests of it
 // alone. In a mix species k is looked up at the thickness of a forest of its own in which as much stands on the path,
-// x'_k = sum_j x_j p_j / p_k with p the paths a unit of thickness of crowns by themselves (src/physics/forest.rs, Known), and paths
-// grow on from there to x; the sky's light, where as much stands on the sky's path; and coverage, where as much stands at all.
+// x'_k = sum_j x_j p_j / p_k with p the paths a unit of thickness of crowns by themselves (src/physics/forest.rs, mix), and paths
+// grow on from there to x; light, where as much stands above what is seen of it; and coverage, where as much stands at all.
 #include "physics/forest.glsl"
 #include "physics/handover.glsl"
+#include "physics/strata.glsl"
 
 layout(binding = 8) uniform sampler3D pair_table;
 layout(binding = 9) uniform sampler2DArray view_table;
@@ -23,6 +24,12 @@ TableSlope slope_of(vec3 v, vec3 n, uint k) {
                        PAIR_TABLES);
 }
 
+// Height above the ground of the middle of a species' crowns, which begin where there is not only bark, and from there to the top; m.
+vec2 crowns_of(Species s) {
+    float scale = 0.5 * (s.scale_range.x + s.scale_range.y), half_crown = 0.5 * s.scale_to_metres.z;
+    return scale * vec2(s.centre + half_crown * (1.0 + s.bare_below), half_crown * (1.0 - s.bare_below));
+}
+
 // What is seen along v (unit, to the viewer) of a slope of normal n; thickness is density times mean area of each species.
 ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIES]) {
     ForestNode f = ForestNode(vec3(0.0), 0.0, vec3(0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
@@ -30,7 +37,9 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
     float total = 0.0;
     vec2 alone[MAX_SPECIES];
     vec3 all = vec3(0.0); // paths of the pattern's trees by themselves and their thickness
-    float sky = 0.0;      // the sky's path of all
+    Layer layers[MAX_SPECIES];
+    Stratum strata_seen[MAX_SPECIES];
+    vec3 through = vec3(0.0); // all layers
     for (uint k = 0u; k < SPECIES_COUNT; k++) {
         // Next to ground without trees there are some: the mix must be defined everywhere.
         thickness[k] += 1e-4;
@@ -39,26 +48,33 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         alone[k] = table_alone(pair_table, view_table, slope_of(v, n, k), float(k), TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES);
         vec2 path = thickness[k] * alone[k];
         all += species.items[k].listed_density > 0.0 ? vec3(0.0) : vec3(path, thickness[k]);
-        sky += thickness[k] * species.items[k].sky_path;
+        vec2 crowns = crowns_of(species.items[k]);
+        vec3 paths = vec3(path.x, max(path.y - path.x, 0.0), thickness[k] * species.items[k].sky_path);
+        layers[k] = Layer(crowns.x - crowns.y, crowns.x + crowns.y, paths);
+        through += layers[k].paths;
     }
+    if (mixed) strata(layers, SPECIES_COUNT, strata_seen);
+    float weights = 0.0;
     for (uint k = 0u; k < SPECIES_COUNT; k++) {
         Species s = species.items[k];
         float x = thickness[k], share = x / total;
-        TableKnown known = TableKnown(x, x, x, x);
+        TableKnown known = TableKnown(x, x, x, x, x);
         if (mixed) {
             // Listed trees keep apart from none, but they are themselves there.
             float own = s.listed_density > 0.0 ? x : 0.0;
-            known = TableKnown(all.x / alone[k].x + own, PAIR_TABLES ? all.y / alone[k].y + own : 0.0, sky / s.sky_path, all.z + own);
+            float joint = PAIR_TABLES ? all.y / alone[k].y + own : 0.0;
+            // Of as much above what is seen of it.
+            vec2 above = strata_seen[k].above / max(through.yz * above_one_layer(through.x), 1e-6);
+            known = TableKnown(all.x / alone[k].x + own, joint, joint * above.x, through.z / s.sky_path * above.y, all.z + own);
         }
         TableForest t = table_forest(pair_table, view_table, slope_of(v, n, k), total, known, s.max_thickness, float(k),
                                      TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES, mixed);
         float path = share * t.seen, relative = relative_distance(distance, s.range), part = path * handed_over(relative);
         f.seen += path;
         f.over += part;
-        // Its crowns are from where there is not only bark to the top.
-        float scale = 0.5 * (s.scale_range.x + s.scale_range.y), crown = 0.5 * s.scale_to_metres.z;
-        f.middle += path * scale * (s.centre + crown * (1.0 + s.bare_below));
-        f.half_depth += path * scale * crown * (1.0 - s.bare_below);
+        vec2 crowns = crowns_of(s);
+        f.middle += path * crowns.x;
+        f.half_depth += path * crowns.y;
         f.converged += path * converged(relative, view.v.convergence);
         f.seen_coverage += share * t.coverage;
         // As many trees as stand on a metre of the slope.
@@ -67,6 +83,8 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         f.gap -= grown * log(max(1.0 - t.ground.y, 1e-6));
         // Where nothing is handed over yet no tree is shown, but the mix must stay defined.
         float weight = max(part, 1e-6 * path);
+        if (mixed) weight *= strata_seen[k].share * through.x / layers[k].paths.x;
+        weights += weight;
         vec3 leaf = (0.5 * sky_over_slope(n.z, known.sky)) * s.albedo * view.v.sky_radiance;
         f.tree_sky += weight * leaf * (t.sky.x + t.sky.y * s.bark_ratio);
         if (PAIR_TABLES) {
@@ -78,7 +96,7 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
             f.tree_lit += weight * (t.sun.x + t.sun.y);
         }
     }
-    float inverse = 1.0 / max(f.over, 1e-6 * f.seen);
+    float inverse = 1.0 / weights;
     f.tree_sun *= inverse * hotspot(v, view.v.sun_direction, view.v.hotspot_amplitude, view.v.hotspot_width);
     f.tree_sky *= inverse;
     f.tree_lit *= inverse;
