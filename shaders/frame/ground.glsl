@@ -55,17 +55,33 @@ vec3 ground_normal(vec2 slope_at, uint layer) {
 // A place some metres from that of a point, on the map; n is the ground's normal there. Whoever includes this defines it.
 CoverPoint moved(GroundPoint from, vec2 by, vec3 n);
 
-// What trees cover of the ground under a ray while it is from `low` to `high` above where it would be on it.
-Cover cover_under(GroundPoint from, vec3 ray, vec3 n, float low, float high) {
+// What trees cover of the ground under a ray while it is from `low` to `high` above where it would be on it; nothing where it is not asked
+// for. (A loop, because drivers on CPUs run what an `if` leaves out.)
+Cover cover_under(GroundPoint from, vec3 ray, vec3 n, float low, float high, bool asked) {
     vec2 middle = lifted(ray, n, 0.5 * (low + high)), way = lifted(ray, n, 0.5 * (high - low));
-    uint count = lift_count(2.0 * from.cover.scale * length(way) * float(COVER_SIDE) / cover_texel(from.cover));
-    Cover c = cover(moved(from, middle + way * lift_height(0u, count), n));
-    for (uint k = 1u; k < count; k++) {
+    float span = 2.0 * from.cover.scale * length(way);
+    uint count = lift_count(span * float(COVER_SIDE) / cover_texel(from.cover));
+    // Of the rest, the mean: no texel finer than a part of the way.
+    from.cover.footprint = max(from.cover.footprint, log2(max(span / float(count), 1e-9)) - view.v.footprint);
+    Cover c;
+    c.texel = c.resolved = 0.0;
+    for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] = vec4(0.0);
+    for (uint k = 0u; k < (asked ? count : 0u); k++) {
         Cover next = cover(moved(from, middle + way * lift_height(k, count), n));
-        for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] += next.channels[g];
+        c.texel = next.texel;
+        c.resolved = next.resolved;
+        for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] += next.channels[g] / float(count);
     }
-    for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] /= float(count);
     return c;
+}
+
+// Thickness of what shades a point: read once, in the mean over where the sun's rays are among the crowns, in the quad's own tile.
+float thickness_towards_sun(GroundPoint from, vec3 n) {
+    CoverPoint c = from.cover;
+    vec2 way = lifted(view.v.sun_direction, n, 2.0 * from.vertical.w);
+    c.footprint = max(c.footprint, log2(max(c.scale * length(way), 1e-9)) - view.v.footprint);
+    c.at.xy += c.scale * lifted(view.v.sun_direction, n, from.vertical.z);
+    return total_thickness(cover(c).channels);
 }
 
 // Ground and, where trees are not drawn one by one, the trees on it (BN12, eq. 11-13 and 24-27).
@@ -76,23 +92,24 @@ GroundLight ground_light(GroundPoint at, vec3 n) {
     float cosine = max(dot(n, view.v.sun_direction), 0.0);
     vec3 v = at.position * (-1.0 / max(distance, 1e-6));
     float low = at.vertical.z - at.vertical.w, high = at.vertical.z + at.vertical.w; // where crowns begin and end
-    Cover c = cover(at.cover), between = cover_under(at, v, n, low, high);
-    float shading = HAS_SUN ? total_thickness(cover_under(at, view.v.sun_direction, n, low, high).channels) : 0.0;
+    // Trees that are drawn one by one hide by themselves.
+    Cover c = cover(at.cover), between = cover_under(at, v, n, low, high, at.paths.x > 0.0);
+    float here = total_thickness(c.channels), thickness = total_thickness(between.channels), shading = here;
+    if (HAS_SUN && at.tree_sky.w > 0.0) shading = thickness_towards_sun(at, n);
     // What the nodes know per thickness, times the pixel's own.
-    float thickness = total_thickness(between.channels);
     float expected = 1.0 - exp(-thickness * at.vertical.y);
     // Interpolation rounds beyond the values at the vertices.
-    float nu = thickness > 0.0 ? clamp(at.tree_sky.w, 0.0, 1.0) : 0.0, trees_lit = clamp(at.tree_sun.w, 0.0, 1.0);
+    float nu = here + shading > 0.0 ? clamp(at.tree_sky.w, 0.0, 1.0) : 0.0, trees_lit = clamp(at.tree_sun.w, 0.0, 1.0);
     float ground_lit = exp(shading * min(at.paths.y - at.paths.z, 0.0));
     GroundLight g;
-    g.coverage = mix(1.0 - exp(-total_thickness(c.channels) * at.vertical.y), c.channels[0].x, c.resolved);
+    g.coverage = mix(1.0 - exp(-here * at.vertical.y), c.channels[0].x, c.resolved);
     float crowns = mix(expected, between.channels[0].x, between.resolved);
     float lit = HAS_SUN ? mix(shadow_maps(at.position, n, cosine, distance), ground_lit, nu) : 0.0;
     // Around the mean of the ground that is seen, so that light is the same at every distance.
     float contrast = mix(ground_contrast(g.coverage, at.paths.w, view.v.ground_contrast), 1.0, nu);
     float open = open_ground(thickness * at.paths.x, at.paths.x / max(at.paths.y, 1e-9), crowns, expected);
     vec3 sun = reflectance * (cosine * lit / PI) * view.v.sun_irradiance;
-    vec3 sky = reflectance * (ground_sky(n.z, exp(-thickness * at.vertical.x), thickness) * contrast) * view.v.sky_radiance;
+    vec3 sky = reflectance * (ground_sky(n.z, exp(-here * at.vertical.x), here) * contrast) * view.v.sky_radiance;
     g.sun = mix(max(at.tree_sun.rgb, 0.0), sun, open);
     g.sky = mix(max(at.tree_sky.rgb, 0.0), sky, open);
     g.trees = 1.0 - open;

@@ -44,22 +44,27 @@ CoverPoint cover_point(TerrainQuad q, vec3 place, float spans) {
                       spans + log2(scale));
 }
 
+bool in_tile(CoverPoint c) { return all(equal(c.at.xy, clamp(c.at.xy, 0.0, 1.0))); }
+
 // Beyond the border of the point's tile it is in that of the quad that is seen there, if any is; else as on the border.
 CoverPoint moved(GroundPoint from, vec2 by, vec3 n) {
     CoverPoint c = from.cover;
     c.at.xy += c.scale * by;
-    if (all(equal(c.at.xy, clamp(c.at.xy, 0.0, 1.0)))) return c;
-    vec2 size = vec2(picture_size());
-    Camera camera = camera_of(view.v, size);
-    vec3 position = from.position + vec3(by, -dot(n.xy, by) / n.z);
-    float distance = dot(position, camera.forward);
-    ivec2 pixel = ivec2(floor(0.5 * size + vec2(dot(position, camera.x), dot(position, camera.y)) / distance));
-    if (distance <= 0.0 || any(notEqual(pixel, clamp(pixel, ivec2(0), ivec2(size) - 1)))) return c;
-    uint other = ground_quad(pixel, 0);
-    if (other == 0u) return c;
-    TerrainQuad q = fetch_quad(other - 1u);
-    CoverPoint there = cover_point(q, place_of(q, position), from.cover.footprint - log2(from.cover.scale));
-    return all(equal(there.at.xy, clamp(there.at.xy, 0.0, 1.0))) ? there : c;
+    // A loop, as in cover_under.
+    for (bool outside = !in_tile(c); outside; outside = false) {
+        vec2 size = vec2(picture_size());
+        Camera camera = camera_of(view.v, size);
+        vec3 position = from.position + vec3(by, -dot(n.xy, by) / n.z);
+        float distance = dot(position, camera.forward);
+        ivec2 pixel = ivec2(floor(0.5 * size + vec2(dot(position, camera.x), dot(position, camera.y)) / distance));
+        if (distance <= 0.0 || any(notEqual(pixel, clamp(pixel, ivec2(0), ivec2(size) - 1)))) break;
+        uint other = ground_quad(pixel, 0);
+        if (other == 0u) break;
+        TerrainQuad q = fetch_quad(other - 1u);
+        CoverPoint there = cover_point(q, place_of(q, position), from.cover.footprint - log2(from.cover.scale));
+        if (in_tile(there)) c = there;
+    }
+    return c;
 }
 
 // A point of a quad's ground; `ray` goes through it, with 1 along the camera's axis, and `distance` is its own along that.
@@ -130,7 +135,9 @@ const bool EDGES = COVER_CHANNELS > 0u;
 // ridges are looked for.
 uint edge_below(ivec2 pixel, ivec2 size) {
     if (!EDGES || VIEW_MODE != 0u || view.v.silhouette_ratio > 1.0) return EDGE_ROWS + 1u;
-    uint row = 0u;
+    // Under most of the sky there is more of it.
+    ivec2 last = ivec2(pixel.x, min(pixel.y + int(EDGE_ROWS), size.y - 1));
+    uint row = ground_quad(last, 0) != 0u ? 0u : EDGE_ROWS + 1u;
     while (row <= EDGE_ROWS && (pixel.y + int(row) >= size.y || ground_samples(pixel + ivec2(0, row)) == 0u)) row++;
     return row;
 }
@@ -155,15 +162,12 @@ float standing_out(GroundPoint at, vec3 n, vec3 ray, float distance) {
     float above = max(dot(ray * distance - at.position, n) / n.z, 0.0);
     float low = max(at.vertical.z - at.vertical.w - above, 0.0), high = at.vertical.z + at.vertical.w - above;
     if (high <= low) return 0.0;
-    float thickness = total_thickness(cover_under(at, -normalize(ray), n, low, high).channels);
+    float thickness = total_thickness(cover_under(at, -normalize(ray), n, low, high, true).channels);
     return 1.0 - exp(-thickness * at.paths.x * (high - low) / (2.0 * at.vertical.w));
 }
 
-// The sky that samples `seen` see, and the trees before it that stand where the ground ends, some rows below.
-Shown sky_beyond(ivec2 pixel, uint seen, ivec2 size) {
-    Shown sky = sky_at(pixel);
-    uint row = edge_below(pixel, size);
-    if (row > EDGE_ROWS) return sky;
+// Those trees before the sky that samples `seen` see, as many rows above the ground's end.
+Shown standing_before(Shown sky, ivec2 pixel, uint row, uint seen, ivec2 size) {
     Camera camera = camera_of(view.v, vec2(size));
     ivec2 edge = pixel + ivec2(0, row);
     vec3 n;
@@ -182,6 +186,15 @@ Shown sky_beyond(ivec2 pixel, uint seen, ivec2 size) {
 #else
     return sum(scaled(sky, 1.0 - trees), Shown(vec4(sun + from_sky, trees)));
 #endif
+}
+
+// The sky that samples `seen` see, and the trees before it that stand where the ground ends, some rows below.
+Shown sky_beyond(ivec2 pixel, uint seen, ivec2 size) {
+    Shown shown = sky_at(pixel);
+    uint row = edge_below(pixel, size);
+    // A loop, as in cover_under.
+    for (bool edge = row <= EDGE_ROWS; edge; edge = false) shown = standing_before(shown, pixel, row, seen, size);
+    return shown;
 }
 
 shared uint items[8u * TILE_SIDE]; // pixels of each column to shade: its row | samples of the ground << 8 | open samples << 16
@@ -237,8 +250,13 @@ void main() {
         uint seen = found >> 8u & 0xffu, sky = found >> 16u & ~ground_samples(pixel);
         float part = 1.0 / float(SAMPLES);
         Shown shown = shown_nothing();
-        if (seen != 0u) shown = scaled(ground_at(pixel, seen, vec2(size)), part * float(bitCount(seen)));
-        if (sky != 0u) shown = sum(shown, scaled(sky_beyond(pixel, sky, ivec2(size)), part * float(bitCount(sky))));
+        // Loops, as in cover_under.
+        for (bool ground = seen != 0u; ground; ground = false) {
+            shown = scaled(ground_at(pixel, seen, vec2(size)), part * float(bitCount(seen)));
+        }
+        for (bool open = sky != 0u; open; open = false) {
+            shown = sum(shown, scaled(sky_beyond(pixel, sky, ivec2(size)), part * float(bitCount(sky))));
+        }
         store_pixel(pixel, shown);
     }
 }

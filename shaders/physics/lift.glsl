@@ -1,6 +1,6 @@
 // Which ground a far forest that is seen, or that shades, stands on. Twin: src/physics/lift.rs, where the forms are derived.
 
-const float LIFT_MOST = 8.0; // heights at which a ray's path through the crowns is read
+const float LIFT_MOST = 4.0; // heights at which a sight line's path through the crowns is read, at most
 
 // How many are, on a way of so many texels, and which: from -1 at the lower end of crowns to 1 at their upper.
 uint lift_count(float texels) { return uint(clamp(ceil(texels), 1.0, LIFT_MOST)); }

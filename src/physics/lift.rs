@@ -6,11 +6,11 @@
 //!
 //! A ray's optical path is the integral of the crowns' extinction along it. Over crowns of even density from height m − b to m + b it is
 //! that of an even forest times x̄/x, where x̄ is the mean of the thickness x over the ground under the ray between these heights: not exp(−x),
-//! which is convex, is averaged, but x. It is read at as many heights as there are texels of the coverage tile on the way, for the view as for the
-//! sun's light on the ground.
+//! which is convex, is averaged, but x. It is read at as many heights as there are texels of the coverage tile on the way, four at most of coarser texels, for the view; at one,
+//! coarser still, for the sun's light on the ground.
 
-/// Heights at which a ray's path through the crowns is read, at most.
-pub const LIFT_MOST: f64 = 8.0;
+/// Heights at which a sight line's path through the crowns is read, at most.
+pub const LIFT_MOST: f64 = 4.0;
 
 /// How many are, on a way of so many texels.
 pub fn lift_count(texels: f64) -> u32 {
@@ -35,7 +35,7 @@ mod tests {
 
     #[test]
     fn heights_are_even_and_as_many_as_texels() {
-        assert_eq!([0.0, 0.9, 1.1, 5.0, 99.0].map(lift_count), [1, 1, 2, 5, 8]);
+        assert_eq!([0.0, 0.9, 1.1, 3.5, 99.0].map(lift_count), [1, 1, 2, 4, 4]);
         assert_eq!(lift_height(0, 1), 0.0);
         let heights: Vec<f64> = (0..4).map(|k| lift_height(k, 4)).collect();
         assert_eq!(heights, [-0.75, -0.25, 0.25, 0.75]);

@@ -115,17 +115,23 @@ mod tests {
         for i in 0..steps {
             let z = to - (f64::from(i) + 0.5) * d;
             let part = |l: &Layer| if l.low < z && z < l.high { d / (l.high - l.low) } else { 0.0 };
-            let through: [f64; 3] =
-                [|l: &Layer| l.seen, |l: &Layer| l.light, |l: &Layer| l.sky].map(|f| layers.iter().map(|l| f(l) * part(l)).sum());
+            let through: [f64; 3] = [|l: &Layer| l.seen, |l: &Layer| l.light, |l: &Layer| l.sky]
+                .map(|f| layers.iter().map(|l| f(l) * part(l)).sum());
             let middle = [0, 1, 2].map(|k| passed[k] + 0.5 * through[k]);
             for (s, l) in sums.iter_mut().zip(layers) {
                 let w = l.seen * part(l) * (-middle[0]).exp();
-                *s = Stratum { share: s.share + w, light: s.light + w * middle[1], sky: s.sky + w * middle[2] };
+                *s = Stratum {
+                    share: s.share + w,
+                    light: s.light + w * middle[1],
+                    sky: s.sky + w * middle[2],
+                };
             }
             passed = [0, 1, 2].map(|k| passed[k] + through[k]);
         }
         let all: f64 = sums.iter().map(|s| s.share).sum();
-        sums.iter().map(|s| Stratum { share: s.share / all, light: s.light / s.share, sky: s.sky / s.share }).collect()
+        sums.iter()
+            .map(|s| Stratum { share: s.share / all, light: s.light / s.share, sky: s.sky / s.share })
+            .collect()
     }
 
     #[test]
@@ -134,7 +140,11 @@ mod tests {
             vec![layer(2.0, 10.0, [1.0, 0.5, 0.7])],
             vec![layer(2.0, 10.0, [3.0, 0.5, 0.7]), layer(8.0, 30.0, [0.5, 0.9, 1.2])],
             vec![layer(20.0, 30.0, [0.3, 0.2, 1.0]), layer(1.0, 5.0, [8.0, 3.0, 2.0])],
-            vec![layer(5.0, 20.0, [4.0, 1.0, 1.0]), layer(5.0, 20.0, [0.01, 0.3, 0.2]), layer(0.0, 25.0, [1.0, 0.0, 0.4])],
+            vec![
+                layer(5.0, 20.0, [4.0, 1.0, 1.0]),
+                layer(5.0, 20.0, [0.01, 0.3, 0.2]),
+                layer(0.0, 25.0, [1.0, 0.0, 0.4]),
+            ],
         ];
         for mix in &mixes {
             for (k, (got, want)) in strata(mix).iter().zip(integrated(mix)).enumerate() {
