@@ -26,6 +26,12 @@ float cover_lod(CoverPoint place) { return max(place.footprint + log2(float(COVE
 // Width of a texel of it, in texels of mip 0.
 float cover_texel(CoverPoint place) { return exp2(min(cover_lod(place), 3.0)); }
 
+// The same place at texels no finer than a span in the tile's coordinates: their mean over it.
+CoverPoint coarsened(CoverPoint place, float span) {
+    place.footprint = max(place.footprint, log2(max(span, 1e-9)) - view.v.footprint);
+    return place;
+}
+
 // The tile's level of detail follows the pixel's footprint. Where a quad morphs to its parent's shape the least level
 // rises to 1, where the parent's tile takes over at its level 0 with the same texels: nothing changes when quads do.
 Cover cover(CoverPoint place) {

@@ -62,7 +62,7 @@ Cover cover_under(GroundPoint from, vec3 ray, vec3 n, float low, float high, boo
     float span = 2.0 * from.cover.scale * length(way);
     uint count = lift_count(span * float(COVER_SIDE) / cover_texel(from.cover));
     // Of the rest, the mean: no texel finer than a part of the way.
-    from.cover.footprint = max(from.cover.footprint, log2(max(span / float(count), 1e-9)) - view.v.footprint);
+    from.cover = coarsened(from.cover, span / float(count));
     Cover c;
     c.texel = c.resolved = 0.0;
     for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] = vec4(0.0);
@@ -77,9 +77,8 @@ Cover cover_under(GroundPoint from, vec3 ray, vec3 n, float low, float high, boo
 
 // Thickness of what shades a point: read once, in the mean over where the sun's rays are among the crowns, in the quad's own tile.
 float thickness_towards_sun(GroundPoint from, vec3 n) {
-    CoverPoint c = from.cover;
     vec2 way = lifted(view.v.sun_direction, n, 2.0 * from.vertical.w);
-    c.footprint = max(c.footprint, log2(max(c.scale * length(way), 1e-9)) - view.v.footprint);
+    CoverPoint c = coarsened(from.cover, from.cover.scale * length(way));
     c.at.xy += c.scale * lifted(view.v.sun_direction, n, from.vertical.z);
     return total_thickness(cover(c).channels);
 }

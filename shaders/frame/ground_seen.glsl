@@ -1,5 +1,5 @@
-// Light on the ground where samples see it, once a pixel, and the sky behind, before which trees stand where the ground ends. One workgroup a tile of 8 x 8 pixels: every invocation
-// lists the pixels of its column that see ground; then the list is shaded by all in turn.
+// Light on the ground where samples see it, once a pixel, and the sky behind, before which trees stand where the ground ends. One workgroup
+// a tile of 8 x 8 pixels: every invocation lists the pixels of its column that see ground or its end; then all shade the list in turn.
 #include "frame/ground.glsl"
 #include "frame/camera.glsl"
 #include "frame/samples.glsl"
@@ -197,7 +197,7 @@ Shown sky_beyond(ivec2 pixel, uint seen, ivec2 size) {
     return shown;
 }
 
-shared uint items[8u * TILE_SIDE]; // pixels of each column to shade: its row | samples of the ground << 8 | open samples << 16
+shared uint items[8u * TILE_SIDE]; // pixels of each column to shade: its row | samples of the ground << 8 | of the sky << 16
 
 // Lists the pixels of this invocation's column that see ground, or sky where it ends. Where others see the sky, that is all that they do.
 void list_pixels(uvec2 corner, uint column, uvec2 size) {
@@ -206,15 +206,15 @@ void list_pixels(uvec2 corner, uint column, uvec2 size) {
         uvec2 pixel = min(corner + uvec2(column, row), size - 1u);
         bool inside = pixel == corner + uvec2(column, row);
         int at = int((pixel.y * size.x + pixel.x) * SAMPLES);
-        uint open = (1u << SAMPLES) - 1u, samples = 0u;
+        uint open = (1u << SAMPLES) - 1u, samples = ground_samples(ivec2(pixel));
         for (uint k = 0u; k < SAMPLES; k++) {
             if (TREES) open &= texelFetch(trees_seen, at + int(k)).x != 0u ? ~(1u << k) : ~0u;
         }
-        samples = ground_samples(ivec2(pixel));
-        bool edge = (open & ~samples) != 0u && edge_below(ivec2(pixel), ivec2(size)) <= EDGE_ROWS;
+        uint sky = open & ~samples;
+        bool edge = sky != 0u && edge_below(ivec2(pixel), ivec2(size)) <= EDGE_ROWS;
         samples &= open;
         if (inside && (samples != 0u || edge)) {
-            items[column * TILE_SIDE + count] = row | samples << 8u | open << 16u;
+            items[column * TILE_SIDE + count] = row | samples << 8u | sky << 16u;
             count++;
         }
         if (inside && samples == 0u && !edge && open != 0u && (!SKY_IMAGE || open + 1u != 1u << SAMPLES)) {
@@ -247,7 +247,7 @@ void main() {
     for (uint i = column; i < total; i += 8u) {
         uint slot = item_slot(i, TILE_SIDE), found = items[slot];
         ivec2 pixel = ivec2(corner + uvec2(slot / TILE_SIDE, found & 0xffu));
-        uint seen = found >> 8u & 0xffu, sky = found >> 16u & ~ground_samples(pixel);
+        uint seen = found >> 8u & 0xffu, sky = found >> 16u;
         float part = 1.0 / float(SAMPLES);
         Shown shown = shown_nothing();
         // Loops, as in cover_under.

@@ -6,8 +6,8 @@
 //!
 //! A ray's optical path is the integral of the crowns' extinction along it. Over crowns of even density from height m − b to m + b it is
 //! that of an even forest times x̄/x, where x̄ is the mean of the thickness x over the ground under the ray between these heights: not exp(−x),
-//! which is convex, is averaged, but x. It is read at as many heights as there are texels of the coverage tile on the way, four at most of coarser texels, for the view; at one,
-//! coarser still, for the sun's light on the ground.
+//! which is convex, is averaged, but x. For the view it is read at as many heights as there are texels of the coverage tile on the way, at most
+//! four, and of coarser texels where four are not enough; for the sun's light on the ground once, of texels as wide as the way.
 
 /// Heights at which a sight line's path through the crowns is read, at most.
 pub const LIFT_MOST: f64 = 4.0;
