@@ -1,31 +1,13 @@
 // Light on the ground (BN12, eq. 10-12) and of the forest far away.
+// Whoever includes this has included frame/ground_point.glsl.
 #include "physics/light.glsl"
 #include "physics/shadow.glsl"
+#include "physics/handover.glsl"
 
-layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
-layout(binding = 3) uniform sampler2DArray slope_tiles;
 layout(binding = 4) uniform sampler2DArray albedo;
 layout(binding = 5) uniform sampler2DArray shadow_map;
-layout(push_constant) uniform Push { TerrainParameters p; };
-
-#include "forest/expected.glsl"
-#include "frame/cover.glsl"
-#include "physics/handover.glsl"
-#include "physics/lift.glsl"
 layout(constant_id = 5) const bool HAS_SUN = true;
 layout(constant_id = 6) const bool SHADOWED = true; // within reach of a cascade
-
-// A point of the ground in the picture.
-struct GroundPoint {
-    vec3 position;      // from the camera, m
-    vec2 slope_at;      // texture coordinates in the quad's tile of slopes
-    uint layer;         // of that tile
-    CoverPoint cover;
-    vec4 tree_sun;      // radiance of the shader-map's trees from the sun; w: their lit fraction
-    vec4 tree_sky;      // from the sky; w: nu
-    vec4 paths;         // over, seen, joint; w: coverage where ground is seen
-    vec4 vertical;      // sky, gap; middle and half depth of crowns
-};
 
 struct GroundLight {
     vec3 sun, sky;  // parts of the radiance
@@ -47,34 +29,6 @@ float shadow_maps(vec3 position, vec3 n, float cosine, float distance) {
     return sun_visibility(shadow_map, at, gradient, view.v.cascade_turn[c].xy, c, NO_TREE, 0.0);
 }
 
-// Unit normal of the ground.
-vec3 ground_normal(vec2 slope_at, uint layer) {
-    return normalize(vec3(-textureLod(slope_tiles, vec3(slope_at, float(layer)), 0.0).rg, 1.0));
-}
-
-// A place some metres from that of a point, on the map; n is the ground's normal there. Whoever includes this defines it.
-CoverPoint moved(GroundPoint from, vec2 by, vec3 n);
-
-// What trees cover of the ground under a ray while it is from `low` to `high` above where it would be on it; nothing where it is not asked
-// for. (A loop, because drivers on CPUs run what an `if` leaves out.)
-Cover cover_under(GroundPoint from, vec3 ray, vec3 n, float low, float high, bool asked) {
-    vec2 middle = lifted(ray, n, 0.5 * (low + high)), way = lifted(ray, n, 0.5 * (high - low));
-    float span = 2.0 * from.cover.scale * length(way);
-    uint count = lift_count(span * float(COVER_SIDE) / cover_texel(from.cover));
-    // Of the rest, the mean: no texel finer than a part of the way.
-    from.cover = coarsened(from.cover, span / float(count));
-    Cover c;
-    c.texel = c.resolved = 0.0;
-    for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] = vec4(0.0);
-    for (uint k = 0u; k < (asked ? count : 0u); k++) {
-        Cover next = cover(moved(from, middle + way * lift_height(k, count), n));
-        c.texel = next.texel;
-        c.resolved = next.resolved;
-        for (uint g = 0u; g < COVER_GROUPS; g++) c.channels[g] += next.channels[g] / float(count);
-    }
-    return c;
-}
-
 // Thickness of what shades a point: read once, in the mean over where the sun's rays are among the crowns, in the quad's own tile.
 float thickness_towards_sun(GroundPoint from, vec3 n) {
     vec2 way = lifted(view.v.sun_direction, n, 2.0 * from.vertical.w);
@@ -94,7 +48,8 @@ GroundLight ground_light(GroundPoint at, vec3 n) {
     // Trees that are drawn one by one hide by themselves.
     Cover c = cover(at.cover), between = cover_under(at, v, n, low, high, at.paths.x > 0.0);
     float here = total_thickness(c.channels), thickness = total_thickness(between.channels), shading = here;
-    if (HAS_SUN && at.tree_sky.w > 0.0) shading = thickness_towards_sun(at, n);
+    float mapped = HAS_SUN ? clamp(4.0 * at.tree_sky.w - 1.0, 0.0, 1.0) : 0.0; // near, shadow maps know better
+    for (bool far = mapped > 0.0; far; far = false) shading = mix(here, thickness_towards_sun(at, n), mapped);
     // What the nodes know per thickness, times the pixel's own.
     float expected = 1.0 - exp(-thickness * at.vertical.y);
     // Interpolation rounds beyond the values at the vertices.

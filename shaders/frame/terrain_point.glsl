@@ -1,4 +1,5 @@
 // The point of the ground that a fragment of the terrain's mesh shows.
+#include "frame/ground_point.glsl"
 #include "frame/ground.glsl"
 
 layout(location = 0) in vec3 position;

@@ -1,6 +1,7 @@
 //! What of a renderer is the image's: its targets, and the passes that draw to them. An image of another size gets another.
 
 use super::ground::Ground;
+use super::horizon::Horizon;
 use super::report::ReadBacks;
 use super::seen_ground::SeenGround;
 use super::stream::{Moment, Streamed};
@@ -27,7 +28,7 @@ enum Passes {
     /// The graphics pipeline: what it finds it lights.
     Graphics(Box<Ground>, Option<Box<Trees>>),
     /// Compute tiles: what is seen is found first, and lit once.
-    Tiles(Box<SeenGround>, Option<Box<TreeTiles>>),
+    Tiles(Box<SeenGround>, Option<Horizon>, Option<Box<TreeTiles>>),
 }
 
 impl Canvas {
@@ -46,7 +47,9 @@ impl Canvas {
                 }
                 Rasterizer::Tiles => {
                     let trees = rows.map(|rows| TreeTiles::new(gpu, scene, plan, rows)).transpose()?;
-                    Passes::Tiles(Box::new(SeenGround::new(gpu, scene, plan)?), trees.map(Box::new))
+                    let horizon = Horizon::new(gpu, scene, plan)?;
+                    let ground = SeenGround::new(gpu, scene, plan)?;
+                    Passes::Tiles(Box::new(ground), horizon, trees.map(Box::new))
                 }
             },
             tonemap: Tonemap::new(gpu, plan)?,
@@ -74,9 +77,9 @@ impl Canvas {
                 Passes::Graphics(pass, trees) => {
                     self.graphics(r, world, streamed, moment, (pass, trees.as_deref()));
                 }
-                Passes::Tiles(pass, trees) => {
+                Passes::Tiles(pass, horizon, trees) => {
                     let shown = trees.as_deref().filter(|_| plan.shows_trees());
-                    self.tiles(r, world, streamed, (pass, shown));
+                    self.tiles(r, world, streamed, (pass, horizon.as_ref(), shown));
                 }
             }
         });
@@ -108,13 +111,16 @@ impl Canvas {
         r: &mut Recorder,
         world: &World,
         streamed: &Streamed,
-        (pass, trees): (&SeenGround, Option<&TreeTiles>),
+        (pass, horizon, trees): (&SeenGround, Option<&Horizon>, Option<&TreeTiles>),
     ) {
         let (view, indices, map) = (&world.view, &world.terrain_indices, &world.shadows.map);
         let ground = (&world.terrain, &streamed.draws);
         let forest = world.forest.as_ref().zip(world.shader_map.as_ref());
         let trees = trees.zip(world.near());
         pass.see(r, view, indices, ground, &self.targets);
+        if let Some((horizon, far)) = horizon.zip(forest) {
+            horizon.record(r, view, ground, far, &self.targets);
+        }
         if let Some((tiles, (forest, cull))) = trees {
             tiles.see(r, view, forest, cull, &self.targets);
         }
@@ -132,7 +138,7 @@ impl Canvas {
 
     /// Has what the tiles find read back.
     pub(super) fn read(&self, recorder: &mut Recorder, plan: &Plan, reads: &mut ReadBacks) -> Result<()> {
-        if let Passes::Tiles(_, Some(tiles)) = &self.passes {
+        if let Passes::Tiles(_, _, Some(tiles)) = &self.passes {
             reads.tiles = plan.shows_trees().then(|| tiles.read_state(recorder)).transpose()?;
         }
         Ok(())

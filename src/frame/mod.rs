@@ -2,6 +2,7 @@
 
 pub mod canvas;
 pub mod ground;
+pub mod horizon;
 pub mod receivers;
 pub mod report;
 pub mod seen_ground;

@@ -52,7 +52,7 @@ impl SeenGround {
                     ("COVER_SIDE", plan.coverage_size),
                     ("SAMPLES", plan.samples),
                     ("TREES", u32::from(plan.shows_trees())),
-                    ("SKY_IMAGE", u32::from(matches!(scene.sky, Sky::LatLong { .. }))),
+                    ("SKY_DRAWN", u32::from(plan.horizon() || matches!(scene.sky, Sky::LatLong { .. }))),
                     ("HAS_SUN", u32::from(plan.sun)),
                     ("SHADOWED", u32::from(plan.cascades > 0)),
                     ("VIEW_MODE", plan.view_mode as u32),

@@ -36,6 +36,8 @@ pub mod pass {
     pub const TILE_LISTS: &str = "tile lists";
     /// Tiles: the tree that each sample sees.
     pub const TILES: &str = "tiles";
+    /// Tiles: the sky, and far trees before it.
+    pub const HORIZON: &str = "horizon";
     /// Tiles: light on the ground.
     pub const GROUND: &str = "ground";
     /// Tiles: light on trees.
@@ -68,6 +70,8 @@ pub mod pipeline {
     pub const TREE_LIGHT: &str = "tree light";
     /// Tiles: prefix sums.
     pub const TILE_SUMS: &str = "tile sums";
+    /// Tiles: the sky, and far trees before it.
+    pub const HORIZON: &str = "horizon";
     /// Tiles: light on the ground.
     pub const GROUND: &str = "ground";
     /// What of a tree's pipelines finds where the sun enters.

@@ -1,6 +1,6 @@
 //! Passes and pipelines that a plan lists.
 
-use super::Plan;
+use super::{Plan, ViewMode};
 use super::items::Items;
 use super::names::{pass, pipeline};
 use super::tiles::{self, Rasterizer};
@@ -14,12 +14,25 @@ const TREE_PIPELINES: [(&str, &str); 4] = [
     (pipeline::CONVERGED, "trees whose light is the average"),
 ];
 
+/// Why there is a pass of its own for the sky.
+const HORIZON: &str = "trees of the shader-map before the sky, where the ground ends";
+
 impl Plan {
+    /// Whether trees of the shader-map are put before the sky where the ground ends: in tiles, and where none are drawn one by one
+    /// there because the ground's silhouettes are looked for.
+    pub fn horizon(&self) -> bool {
+        let shown = self.rasterizer == Rasterizer::Tiles && self.view_mode == ViewMode::Radiance;
+        shown && self.forest && self.ladder.averages() && self.silhouette_ratio <= 1.0
+    }
+
     /// Pipelines that depend on more than the scene's having trees.
     pub(super) fn list_pipelines(&self, scene: &Scene, items: &mut Items) {
         let mut add = |name: &str, reason: &str| items.step("pipeline", name, reason);
         let tiles = self.rasterizer == Rasterizer::Tiles;
         if tiles {
+            if self.horizon() {
+                add(pipeline::HORIZON, HORIZON);
+            }
             add(pipeline::GROUND, "light on the ground, once a pixel that sees it");
         }
         if self.z_fields {
@@ -65,6 +78,9 @@ impl Plan {
         }
         add(pass::TERRAIN, "the ground");
         let tiles = self.rasterizer == Rasterizer::Tiles;
+        if self.horizon() {
+            add(pass::HORIZON, HORIZON);
+        }
         if self.z_fields && tiles {
             tiles::TREE_PASSES.iter().for_each(|(name, reason)| add(name, reason));
         }
