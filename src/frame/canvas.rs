@@ -79,7 +79,7 @@ impl Canvas {
                 }
                 Passes::Tiles(pass, horizon, trees) => {
                     let shown = trees.as_deref().filter(|_| plan.shows_trees());
-                    self.tiles(r, world, streamed, (pass, horizon.as_ref(), shown));
+                    self.tiles(r, world, streamed, moment, (pass, horizon.as_ref(), shown));
                 }
             }
         });
@@ -111,6 +111,7 @@ impl Canvas {
         r: &mut Recorder,
         world: &World,
         streamed: &Streamed,
+        moment: Moment,
         (pass, horizon, trees): (&SeenGround, Option<&Horizon>, Option<&TreeTiles>),
     ) {
         let (view, indices, map) = (&world.view, &world.terrain_indices, &world.shadows.map);
@@ -119,7 +120,11 @@ impl Canvas {
         let trees = trees.zip(world.near());
         pass.see(r, view, indices, ground, &self.targets);
         if let Some((horizon, far)) = horizon.zip(forest) {
-            horizon.record(r, view, ground, far, &self.targets);
+            if streamed.far_trees {
+                horizon.record(r, view, ground, far, &self.targets);
+            } else {
+                horizon.clear(r, moment.light.sky.map(|c| (c * moment.light.scale) as f32), &self.targets);
+            }
         }
         if let Some((tiles, (forest, cull))) = trees {
             tiles.see(r, view, forest, cull, &self.targets);

@@ -7,7 +7,7 @@ use super::trees::shader_map::ShaderMap;
 use crate::Result;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::gpu::interface::TILE_SIDE;
-use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
+use crate::gpu::{Buffer, Gpu, Layers, Program, Recorder, Resource, Sampler, Targets, shaders};
 use crate::plan::Plan;
 use crate::plan::names::pass;
 use crate::scene::{Scene, Sky};
@@ -16,6 +16,8 @@ use crate::scene::{Scene, Sky};
 pub struct Horizon {
     program: Program,
     tiles: [u32; 2],
+    /// Of a uniform sky, which is not in the picture yet.
+    clears: bool,
 }
 
 impl Horizon {
@@ -33,14 +35,33 @@ impl Horizon {
             (true, true) => &shaders::FRAME_HORIZON_LAYERS_COMP,
             (true, false) => &shaders::FRAME_HORIZON_LAYERS_SINGLE_COMP,
         };
+        let image = matches!(scene.sky, Sky::LatLong { .. });
         let constants = [
             ("COVER_CHANNELS", plan.cover_channels),
             ("COVER_SIDE", plan.coverage_size),
             ("SAMPLES", plan.samples),
-            ("SKY_DRAWN", u32::from(matches!(scene.sky, Sky::LatLong { .. }))),
+            ("SKY_DRAWN", u32::from(image)),
         ];
         let tiles = plan.size.map(|n| n.div_ceil(TILE_SIDE));
-        Ok(Some(Horizon { program: gpu.compute(shader, &constants)?, tiles }))
+        Ok(Some(Horizon { program: gpu.compute(shader, &constants)?, tiles, clears: !image }))
+    }
+
+    /// Records the pass of a frame in which no tree is of the shader-map: the sky alone, of this radiance if it is uniform.
+    pub fn clear(&self, recorder: &mut Recorder, sky: [f32; 3], targets: &ImageTargets) {
+        if !self.clears {
+            return;
+        }
+        let [r, g, b] = sky;
+        // Of the layers, the second is the light of the sky.
+        let sky_at = usize::from(targets.colors.len() > 1);
+        let color = |k: usize| if k == sky_at { [r, g, b, 0.0] } else { [0.0; 4] };
+        let colors: Vec<_> =
+            targets.colors.iter().enumerate().map(|(k, t)| t.attachment(Some(color(k)), false)).collect();
+        recorder.render(
+            pass::HORIZON,
+            &Targets { colors: &colors, depth: None, layers: Layers::One(0) },
+            |_| {},
+        );
     }
 
     /// Records the pass, once it is known where samples see the ground.

@@ -37,6 +37,8 @@ pub struct Streamed {
     pub produced: Tiles,
     /// Tiles thrown out for them.
     pub evicted: Tiles,
+    /// Whether any ground is so far that trees on it may be the shader-map's.
+    pub far_trees: bool,
     trees: Option<(SeedWork, CoverageWork)>,
 }
 
@@ -78,7 +80,10 @@ impl World {
                 + self.casters().map_or(0, CasterData::fresh_quads),
             coverage: trees.as_ref().map_or(0, |(_, coverage)| coverage.tiles),
         };
-        Ok(Streamed { draws, view, produced, evicted: self.evicted().since(before), trees })
+        let tree = &self.terrain.tree;
+        let far_trees =
+            draws.keys.iter().any(|quad| tree.farthest(*quad, eye.position) > plan.averages_from());
+        Ok(Streamed { draws, view, produced, evicted: self.evicted().since(before), far_trees, trees })
     }
 
     /// Records the passes that produce what is new.

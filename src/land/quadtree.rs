@@ -130,10 +130,20 @@ impl Quadtree {
     /// No point of a quad as it is drawn is nearer to `eye`, m. Where it morphs it has its parent's shape, which may leave its own
     /// bounds, but not its parent's heights.
     pub fn nearest(&self, quad: QuadKey, eye: [f64; 3]) -> f64 {
+        self.drawn(quad).distance(eye)
+    }
+
+    /// No point of a quad as it is drawn is farther from `eye`, m.
+    pub fn farthest(&self, quad: QuadKey, eye: [f64; 3]) -> f64 {
+        self.drawn(quad).farthest(eye)
+    }
+
+    /// Bounds of a quad as it is drawn.
+    fn drawn(&self, quad: QuadKey) -> Bounds {
         let (low, high) = self.rectangle(quad);
         let (parent_low, parent_high) = self.rectangle(quad.ancestor(quad.level.saturating_sub(1)));
         let [min, max] = self.height_range(parent_low, parent_high);
-        Bounds { low: [low[0], low[1], min], high: [high[0], high[1], max] }.distance(eye)
+        Bounds { low: [low[0], low[1], min], high: [high[0], high[1], max] }
     }
 
     /// The quads to draw from `eye`, in order: those whose bounds `keep` keeps; `None` when there are more than `most`.

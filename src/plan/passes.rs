@@ -1,9 +1,9 @@
 //! Passes and pipelines that a plan lists.
 
-use super::{Plan, ViewMode};
 use super::items::Items;
 use super::names::{pass, pipeline};
 use super::tiles::{self, Rasterizer};
+use super::{Plan, ViewMode};
 use crate::scene::{Scene, Sky};
 
 /// Pipelines of the graphics rasteriser's tree pass, and for which trees.

@@ -95,6 +95,12 @@ impl Plan {
         !self.forest || self.ladder.averages() || farthest <= self.ladder.opaque_to(self.range)
     }
 
+    /// Distance to which no tree has begun to hand over to an average, m.
+    pub fn averages_from(&self) -> f64 {
+        let nearest = self.species_range.iter().copied().fold(f64::INFINITY, f64::min);
+        if self.ladder.averages() { self.ladder.opaque_to(nearest) } else { f64::INFINITY }
+    }
+
     /// Whether any tree of a scene may be near enough to a place to be drawn by itself. The nearest ground, below most cameras, saves
     /// looking at all of it.
     pub(super) fn scene_in_range(&self, scene: &Scene, place: [f64; 3]) -> bool {
