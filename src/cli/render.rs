@@ -282,6 +282,7 @@ fn draw(
     let drawing = args.rasterizer.drawing(None);
     let mut plan = Plan::for_eye(&scene, &eye, args.exr.is_some(), drawing, Some(gpu.info()))?;
     plan.view_mode = args.view_mode;
+    plan.list(&scene);
     let scene = Arc::new(scene);
     let start = Instant::now();
     let (mut baked, mut states): (Vec<Baked>, Vec<Bake>) = (Vec::new(), Vec::new());

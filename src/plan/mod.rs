@@ -65,7 +65,8 @@ pub struct Plan {
     pub items: Vec<Item>,
     /// What stands for a tree, near to far, with the apparent heights between the rungs.
     pub ladder: Ladder,
-    /// What the picture shows; [`Plan::new`] says radiance, and whoever wants another mode sets it before the renderer is made.
+    /// What the picture shows; [`Plan::new`] says radiance, and whoever wants another mode sets it before the renderer is made, and has the
+    /// plan listed anew ([`Plan::list`]).
     pub view_mode: ViewMode,
     /// What finds the samples of trees.
     pub rasterizer: Rasterizer,

@@ -41,6 +41,7 @@ fn planned(
     let eye = Eye::new(&camera, &scene.terrain, SIZE);
     let mut plan = Plan::for_eye(&scene, &eye, layers, rasterizer, Some(gpu.info()))?;
     change(&mut plan);
+    plan.list(&scene);
     let exposure = auto_exposure(&scene);
     let baked = bakes(&scene, &plan, options)?;
     Ok((Renderer::new(gpu, Arc::new(scene), plan, &baked)?, camera, exposure))
