@@ -2,10 +2,11 @@
 
 pub mod cache;
 mod correction;
+pub(crate) mod envelope;
 #[doc(hidden)]
 pub mod file;
 mod least_squares;
-mod occlusion;
+pub(crate) mod occlusion;
 pub(crate) mod optics;
 mod raster;
 mod scene;

@@ -170,6 +170,30 @@ impl<'a> Caster<'a> {
         self.triangles.occluded(origin, direction, t_min, stack, |f, u, v| self.surface.is_at(f, u, v))
     }
 
+    /// Whether any surface is on the ray but that of some faces.
+    pub fn occluded_by_others(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        own: &impl Fn(u32) -> bool,
+        stack: &mut Stack,
+    ) -> bool {
+        let opaque = |f, u, v| !own(f) && self.surface.is_at(f, u, v);
+        self.triangles.occluded(origin, direction, 0.0, stack, opaque)
+    }
+
+    /// The first surface on the ray but that of some faces, if there is any.
+    pub fn first_of_others(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        own: &impl Fn(u32) -> bool,
+        stack: &mut Stack,
+    ) -> Option<Met> {
+        let opaque = |face, u, v| !own(face) && self.surface.is_at(face, u, v);
+        self.triangles.nearest(origin, direction, f32::MAX, stack, opaque)
+    }
+
     /// The first surface on the ray, if there is any.
     pub fn first(&self, origin: Vec3, direction: Vec3, stack: &mut Stack) -> Option<Met> {
         let opaque = |face, u, v| self.surface.is_at(face, u, v);

@@ -7,6 +7,7 @@ mod compare;
 mod conform;
 mod devices;
 mod difference;
+mod leaves;
 mod options;
 mod output;
 mod plan;
@@ -58,6 +59,8 @@ enum Command {
     Accuracy(accuracy::Args),
     /// Precompute a tree model ahead of time (otherwise done on first use), and measure how good it is.
     Bake(bake::Args),
+    /// Light on leaves by their envelopes, with one bounce, against paths traced through the tree, term by term.
+    Leaves(leaves::Args),
     /// Write a procedural tree as binary glTF.
     Tree(tree::Args),
     /// List what a scene requires, with reasons and bytes, without building any of it.
@@ -79,6 +82,7 @@ pub fn run() -> ExitCode {
         Command::Reflectance(args) => reflectance::run(&args),
         Command::Accuracy(args) => accuracy::run(&args),
         Command::Bake(args) => bake::run(&args),
+        Command::Leaves(args) => leaves::run(&args),
         Command::Tree(args) => tree::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Conform(args) => conform::run(&args),

@@ -5,6 +5,7 @@ pub mod bench;
 pub mod compare;
 pub mod conform;
 pub mod host;
+pub mod leaves;
 pub mod metrics;
 pub mod pace;
 mod page;

@@ -1,0 +1,211 @@
+//! Envelopes of leaves (BBP08 section 6): for every leaf, how thick the tree around it is in a few directions.
+//!
+//! BBP08 multiply the solid angles of neighbour leaves sorted by distance, all as if they were seen from the front. Here rays are cast at
+//! the mesh, through leaf masks, bark included: the share of rays of a direction's cell of the sphere that leave the tree is e^(−t), and t the
+//! optical thickness. A leaf does not hide itself. A cell that no ray leaves has the thickness of half a ray.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::surface::{Caster, Face, Surface};
+use crate::physics::leaf::Directions;
+use crate::progress::Progress;
+use crate::rays::Stack;
+use crate::scene::Mesh;
+
+/// Rays a direction, on average.
+pub const RAYS: u32 = 32;
+/// Faces that hang together are one leaf up to this radius, as a part of the tree's half width; in larger ones each is its own.
+const LARGEST: f32 = 0.1;
+
+/// Leaves of a tree, and what each knows of the tree around it.
+#[derive(Clone, Debug)]
+pub struct Envelopes {
+    /// Leaf of every face of the surface; `None` for what is not foliage, where any is.
+    pub leaf_of: Vec<Option<u32>>,
+    /// Optical thickness of the tree in each direction, leaf after leaf.
+    pub thickness: Vec<f64>,
+    /// Directions a leaf.
+    pub directions: usize,
+}
+
+impl Envelopes {
+    /// Casts `rays` a direction and leaf, on average.
+    pub fn new(mesh: &Mesh, surface: &Surface, directions: &Directions, rays: u32, quiet: bool) -> Self {
+        let (leaf_of, count) = leaves(mesh, surface);
+        let mut faces = vec![Vec::new(); count];
+        for (face, leaf) in leaf_of.iter().enumerate() {
+            if let Some(leaf) = leaf {
+                faces[*leaf as usize].push(face as u32);
+            }
+        }
+        let caster = Caster::new(surface);
+        let progress = Progress::new("baking envelopes of leaves", count as u64, quiet);
+        let thickness = faces
+            .par_iter()
+            .enumerate()
+            .map_init(Stack::new, |stack, (leaf, faces)| {
+                progress.step(1);
+                let own = |face: u32| leaf_of[face as usize] == Some(leaf as u32);
+                let origin = |k| place(surface, faces, k);
+                thickness((&caster, own), origin, directions, rays, leaf as u32, stack)
+            })
+            .flatten()
+            .collect();
+        progress.finish();
+        Envelopes { leaf_of, thickness, directions: directions.len() }
+    }
+
+    /// Number of leaves.
+    pub fn count(&self) -> usize {
+        self.thickness.len() / self.directions
+    }
+
+    /// What a leaf knows.
+    pub fn of(&self, leaf: u32) -> &[f64] {
+        let first = leaf as usize * self.directions;
+        &self.thickness[first..first + self.directions]
+    }
+}
+
+/// Leaf of every face, and how many there are: faces that share a corner are one. Without foliage all faces stand for leaves.
+fn leaves(mesh: &Mesh, surface: &Surface) -> (Vec<Option<u32>>, usize) {
+    let any = surface.faces.iter().any(|f| mesh.materials[f.material as usize].foliage);
+    let is_leaf = |f: &Face| !any || mesh.materials[f.material as usize].foliage;
+    // Each corner's faces lead to one of them, the root.
+    let mut parent: Vec<u32> = (0..surface.faces.len() as u32).collect();
+    let mut at_corner = std::collections::HashMap::new();
+    for (k, face) in surface.faces.iter().enumerate().filter(|(_, f)| is_leaf(f)) {
+        for p in face.p {
+            let first = *at_corner.entry(p.to_array().map(f32::to_bits)).or_insert(k as u32);
+            let (a, b) = (root(&mut parent, first), root(&mut parent, k as u32));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let roots: Vec<u32> = (0..parent.len() as u32).map(|k| root(&mut parent, k)).collect();
+    let mut bounds = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); roots.len()];
+    for (face, root) in surface.faces.iter().zip(&roots) {
+        let b = &mut bounds[*root as usize];
+        *b = face.p.iter().fold(*b, |(low, high), p| (low.min(*p), high.max(*p)));
+    }
+    let large = |root: u32| {
+        let (low, high) = bounds[root as usize];
+        0.5 * ((high - low) * surface.frame.scale()).length() > LARGEST * surface.frame.half_width
+    };
+    let (mut names, mut count) = (std::collections::HashMap::new(), 0u32);
+    let mut name = |key: u32| {
+        *names.entry(key).or_insert_with(|| {
+            count += 1;
+            count - 1
+        })
+    };
+    let leaf_of = (0u32..).zip(&surface.faces).map(|(k, face)| {
+        is_leaf(face).then(|| name(if large(roots[k as usize]) { k } else { roots[k as usize] }))
+    });
+    let leaf_of = leaf_of.collect();
+    (leaf_of, count as usize)
+}
+
+/// The face that stands for all that a face hangs together with.
+fn root(parent: &mut [u32], mut k: u32) -> u32 {
+    while parent[k as usize] != k {
+        parent[k as usize] = parent[parent[k as usize] as usize];
+        k = parent[k as usize];
+    }
+    k
+}
+
+/// Point k of an even sequence over a leaf's faces in turn, m; where its masks leave nothing, their middles.
+fn place(surface: &Surface, faces: &[u32], k: u32) -> Vec3 {
+    let face = &surface.faces[faces[k as usize % faces.len()] as usize];
+    let [a, b, c] = face.p.map(|p| surface.frame.to_metres(p));
+    // One of a few next places that are no holes.
+    let (s, t) = (0..8).find_map(|more| surface.spread(face, 8 * k + more)).unwrap_or((1.0 / 3.0, 1.0 / 3.0));
+    a + (b - a) * s + (c - a) * t
+}
+
+/// Thickness around a leaf.
+fn thickness(
+    (caster, own): (&Caster, impl Fn(u32) -> bool),
+    origin: impl Fn(u32) -> Vec3,
+    directions: &Directions,
+    rays: u32,
+    seed: u32,
+    stack: &mut Stack,
+) -> Vec<f64> {
+    let count = rays * directions.len() as u32;
+    let mut cells = vec![(0u32, 0u32); directions.len()];
+    for k in 0..count {
+        let w = super::occlusion::sky_direction(k % (count / 2), count / 2, seed);
+        let w = if k < count / 2 { w } else { -w };
+        let cell = &mut cells[directions.nearest(w.as_dvec3().to_array())];
+        cell.0 += 1;
+        cell.1 += u32::from(!caster.occluded_by_others(origin(k), w, &own, stack));
+    }
+    let thickness = |(all, open): (u32, u32)| {
+        if all == 0 { 0.0 } else { (f64::from(all) / f64::from(open).max(0.5)).ln() }
+    };
+    cells.into_iter().map(thickness).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::mesh::{Material, Triangle};
+
+    fn square(mesh: &mut Mesh, [x, z]: [f32; 2], half: f32) {
+        let base = mesh.positions.len() as u32;
+        for (dx, dy) in [(-half, -half), (half, -half), (half, half), (-half, half)] {
+            mesh.positions.push([x + dx, dy, z]);
+            mesh.normals.push([0.0, 0.0, 1.0]);
+            mesh.uvs.push([0.0; 2]);
+        }
+        for vertices in [[base, base + 1, base + 2], [base, base + 2, base + 3]] {
+            mesh.triangles.push(Triangle { vertices, material: 0 });
+        }
+    }
+
+    /// Leaves of half a metre, apart from each other, under a roof; or without it.
+    fn envelopes(roof: bool) -> Envelopes {
+        let mut mesh = Mesh::default();
+        mesh.materials.push(Material {
+            name: "leaf".into(),
+            foliage: true,
+            base_color: [1.0; 4],
+            texture: None,
+            alpha_cutoff: None,
+            double_sided: true,
+        });
+        square(&mut mesh, [0.0, 1.0], 0.25);
+        square(&mut mesh, [10.0, 1.0], 0.25);
+        square(&mut mesh, [0.0, 0.0], 0.01);
+        if roof {
+            square(&mut mesh, [0.0, 2.0], 1000.0);
+        } else {
+            // As wide, and in nobody's way.
+            square(&mut mesh, [1000.0, 1.0], 0.25);
+        }
+        let surface = Surface::new(&mesh).unwrap();
+        Envelopes::new(&mesh, &surface, &Directions::new(26).unwrap(), 64, true)
+    }
+
+    #[test]
+    fn a_roof_closes_what_is_above_and_a_leaf_does_not_hide_itself() {
+        let directions = Directions::new(26).unwrap();
+        let (open, roofed) = (envelopes(false), envelopes(true));
+        // Faces that share corners are one leaf; a roof of two faces larger than a leaf can be is two.
+        assert_eq!((open.count(), roofed.count()), (4, 5));
+        assert_eq!(open.leaf_of[..4], [Some(0), Some(0), Some(1), Some(1)]);
+        for (k, w) in directions.to.iter().enumerate() {
+            // The small square below takes a thousandth of the lower cell.
+            assert!(open.of(0)[k] < 0.1, "{w:?}: {}", open.of(0)[k]);
+            let t = roofed.of(0)[k];
+            match w[2] {
+                z if z > 0.5 => assert!(t > 64f64.ln(), "{w:?}: {t}"),
+                z if z < -0.5 => assert!(t < 0.1, "{w:?}: {t}"),
+                // Half of a level cell is under the roof.
+                _ => assert!((t - 2f64.ln()).abs() < 0.35, "{w:?}: {t}"),
+            }
+        }
+    }
+}
