@@ -2,12 +2,15 @@
 //!
 //! BBP08 multiply the solid angles of neighbour leaves sorted by distance, all as if they were seen from the front. Here rays are cast at
 //! the mesh, through leaf masks, bark included: the share of rays of a direction's cell of the sphere that leave the tree is e^(−t), and t the
-//! optical thickness. A leaf does not hide itself. A cell that no ray leaves has the thickness of half a ray.
+//! optical thickness. A leaf does not hide itself. Of a leaf places count as they are seen ([`thickness`]). A cell that no ray leaves has the
+//! thickness of half a ray.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::occlusion::sky_direction;
 use super::surface::{Caster, Face, Surface};
+use crate::physics::hash::hash2;
 use crate::physics::leaf::Directions;
 use crate::progress::Progress;
 use crate::rays::Stack;
@@ -15,6 +18,8 @@ use crate::scene::Mesh;
 
 /// Rays a direction, on average.
 pub const RAYS: u32 = 32;
+/// Of these, rays from one place of the leaf, over the whole sphere.
+const RAYS_A_PLACE: u32 = 32;
 /// Faces that hang together are one leaf up to this radius, as a part of the tree's half width; in larger ones each is its own.
 const LARGEST: f32 = 0.1;
 
@@ -124,7 +129,11 @@ fn place(surface: &Surface, faces: &[u32], k: u32) -> Vec3 {
     a + (b - a) * s + (c - a) * t
 }
 
-/// Thickness around a leaf.
+/// Thickness around what is seen of a leaf, from all sides on average.
+///
+/// A viewer outside sees a place of it with the probability that a ray leaves from there, its openness o. So what the light of a direction
+/// finds there, V (1 or 0), has the mean Σ o V / Σ o over places: more than Σ V, because open places are open to all. A ray's own V is left
+/// out of its place's o, or its noise would count as openness.
 fn thickness(
     (caster, own): (&Caster, impl Fn(u32) -> bool),
     origin: impl Fn(u32) -> Vec3,
@@ -133,17 +142,32 @@ fn thickness(
     seed: u32,
     stack: &mut Stack,
 ) -> Vec<f64> {
-    let count = rays * directions.len() as u32;
-    let mut cells = vec![(0u32, 0u32); directions.len()];
-    for k in 0..count {
-        let w = super::occlusion::sky_direction(k % (count / 2), count / 2, seed);
-        let w = if k < count / 2 { w } else { -w };
-        let cell = &mut cells[directions.nearest(w.as_dvec3().to_array())];
-        cell.0 += 1;
-        cell.1 += u32::from(!caster.occluded_by_others(origin(k), w, &own, stack));
+    let places = (rays * directions.len() as u32).div_ceil(RAYS_A_PLACE);
+    // Rays, those that leave, and the same weighted by openness.
+    let mut cells = vec![[0u32; 4]; directions.len()];
+    for place in 0..places {
+        let origin = origin(place);
+        let found: [(usize, bool); RAYS_A_PLACE as usize] = std::array::from_fn(|k| {
+            let (half, k) = (RAYS_A_PLACE / 2, k as u32);
+            let w = sky_direction(k % half, half, hash2(seed, 2 * place + k / half));
+            let w = if k < half { w } else { -w };
+            (directions.nearest(w.as_dvec3().to_array()), !caster.occluded_by_others(origin, w, &own, stack))
+        });
+        let open = found.iter().filter(|(_, leaves)| *leaves).count() as u32;
+        for (cell, leaves) in found {
+            let (leaves, cell) = (u32::from(leaves), &mut cells[cell]);
+            let others = open - leaves;
+            for (sum, more) in cell.iter_mut().zip([1, leaves, others, others * leaves]) {
+                *sum += more;
+            }
+        }
     }
-    let thickness = |(all, open): (u32, u32)| {
-        if all == 0 { 0.0 } else { (f64::from(all) / f64::from(open).max(0.5)).ln() }
+    let thickness = |[all, open, weight, weighted]: [u32; 4]| match (all, open, weighted) {
+        (0, ..) => 0.0,
+        (_, 0, _) => (2.0 * f64::from(all)).ln(),
+        // Single rays leave from places that are open to nothing else.
+        (_, _, 0) => (f64::from(all) / f64::from(open)).ln(),
+        _ => (f64::from(weight) / f64::from(weighted)).ln(),
     };
     cells.into_iter().map(thickness).collect()
 }
