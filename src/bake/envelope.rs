@@ -8,7 +8,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::occlusion::sky_direction;
+use super::occlusion::sphere_direction;
 use super::surface::{Caster, Face, Surface};
 use crate::physics::hash::hash2;
 use crate::physics::leaf::Directions;
@@ -146,11 +146,9 @@ fn thickness(
     // Rays, those that leave, and the same weighted by openness.
     let mut cells = vec![[0u32; 4]; directions.len()];
     for place in 0..places {
-        let origin = origin(place);
+        let (origin, seeds) = (origin(place), [0, 1].map(|half| hash2(seed, 2 * place + half)));
         let found: [(usize, bool); RAYS_A_PLACE as usize] = std::array::from_fn(|k| {
-            let (half, k) = (RAYS_A_PLACE / 2, k as u32);
-            let w = sky_direction(k % half, half, hash2(seed, 2 * place + k / half));
-            let w = if k < half { w } else { -w };
+            let w = sphere_direction(k as u32, RAYS_A_PLACE, seeds);
             (directions.nearest(w.as_dvec3().to_array()), !caster.occluded_by_others(origin, w, &own, stack))
         });
         let open = found.iter().filter(|(_, leaves)| *leaves).count() as u32;

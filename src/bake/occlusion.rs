@@ -198,6 +198,13 @@ pub fn sky_direction(k: u32, n: u32, seed: u32) -> Vec3 {
     Vec3::new(r * c, r * s, z)
 }
 
+/// Direction k of n, an even number, over the whole sphere: the hemisphere's, turned by a seed, and behind them as many by another.
+pub fn sphere_direction(k: u32, n: u32, seeds: [u32; 2]) -> Vec3 {
+    let half = n / 2;
+    let w = sky_direction(k % half, half, seeds[(k / half) as usize]);
+    if k < half { w } else { -w }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -196,8 +196,7 @@ impl<'a> Caster<'a> {
 
     /// The first surface on the ray, if there is any.
     pub fn first(&self, origin: Vec3, direction: Vec3, stack: &mut Stack) -> Option<Met> {
-        let opaque = |face, u, v| self.surface.is_at(face, u, v);
-        self.triangles.nearest(origin, direction, f32::MAX, stack, opaque)
+        self.first_of_others(origin, direction, &|_| false, stack)
     }
 
     /// Unit normal of a face, to either side.

@@ -108,12 +108,7 @@ impl Ground {
         targets: &ImageTargets,
         sky: Option<[f32; 3]>,
     ) {
-        let color = |k: usize| match (targets.colors.len(), k) {
-            // With layers the background is sky light that no tree or ground reflects.
-            (1, _) => sky.map(|c| [c[0], c[1], c[2], 0.0]),
-            (_, 1) => sky.map(|c| [c[0], c[1], c[2], 0.0]),
-            _ => sky.map(|_| [0.0; 4]),
-        };
+        let color = |k: usize| sky.map(|radiance| targets.sky_clear(k, radiance));
         let last = forest.is_none_or(|(f, _)| f.near.is_none());
         let colors: Vec<_> =
             targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), last)).collect();

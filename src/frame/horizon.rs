@@ -51,10 +51,7 @@ impl Horizon {
         if !self.clears {
             return;
         }
-        let [r, g, b] = sky;
-        // Of the layers, the second is the light of the sky.
-        let sky_at = usize::from(targets.colors.len() > 1);
-        let color = |k: usize| if k == sky_at { [r, g, b, 0.0] } else { [0.0; 4] };
+        let color = |k: usize| targets.sky_clear(k, sky);
         let colors: Vec<_> =
             targets.colors.iter().enumerate().map(|(k, t)| t.attachment(Some(color(k)), false)).collect();
         recorder.render(

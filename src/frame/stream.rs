@@ -81,8 +81,8 @@ impl World {
             coverage: trees.as_ref().map_or(0, |(_, coverage)| coverage.tiles),
         };
         let tree = &self.terrain.tree;
-        let far_trees =
-            draws.keys.iter().any(|quad| tree.farthest(*quad, eye.position) > plan.averages_from());
+        let averages_from = plan.averages_from();
+        let far_trees = draws.keys.iter().any(|quad| tree.farthest(*quad, eye.position) > averages_from);
         Ok(Streamed { draws, view, produced, evicted: self.evicted().since(before), far_trees, trees })
     }
 

@@ -101,6 +101,11 @@ impl ImageTargets {
         Ok(Picture { size: plan.size, display, linear: linear.transpose()? })
     }
 
+    /// What colour target k starts from where a uniform sky of this radiance is behind all: of the layers, the second is the sky's light.
+    pub fn sky_clear(&self, k: usize, [r, g, b]: [f32; 3]) -> [f32; 4] {
+        if self.colors.len() == 1 || k == 1 { [r, g, b, 0.0] } else { [0.0; 4] }
+    }
+
     /// The resolved colour images by the names that compute shaders have for them.
     pub fn shown(&self) -> Vec<(&'static str, Resource<'_>)> {
         let names: &[&str] = match self.colors.len() {

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use crate::Result;
 use crate::bake::envelope::{Envelopes, RAYS};
-use crate::bake::occlusion::sky_direction;
+use crate::bake::occlusion::sphere_direction;
 use crate::bake::optics::colours;
 use crate::bake::surface::{Caster, Surface};
 use crate::physics::hash::{Stream, hash2};
@@ -190,9 +190,9 @@ impl Tree<'_> {
         let (own, n, v) = (|f: u32| f == face, normal.to_array(), viewer.to_array());
         let sun = scattering(self.leaf, n, v, self.sun().to_array()) * self.sees_sun(place, face, stack);
         let (mut sky, mut bounce) = (0.0, 0.0);
+        let seeds = [0, 1].map(|half| hash2(seed, half));
         for k in 0..TRUTH {
-            let w = sky_direction(k % (TRUTH / 2), TRUTH / 2, hash2(seed, k / (TRUTH / 2)));
-            let w = if k < TRUTH / 2 { w } else { -w };
+            let w = sphere_direction(k, TRUTH, seeds);
             let part = scattering(self.leaf, n, v, w.as_dvec3().to_array()) * 4.0 * PI / f64::from(TRUTH);
             match self.caster.first_of_others(place, w, &own, stack) {
                 None => sky += part * self.around(w.as_dvec3().to_array()),
@@ -250,10 +250,9 @@ impl Tree<'_> {
 
     /// Mean radiance from around over the cell of each direction.
     fn around_cells(&self, directions: &Directions) -> Vec<f64> {
-        let (mut cells, n) = (vec![(0.0, 0.0); directions.len()], 4096);
-        for k in 0..2 * n {
-            let w = sky_direction(k % n, n, 0);
-            let w = (if k < n { w } else { -w }).as_dvec3().to_array();
+        let (mut cells, n) = (vec![(0.0, 0.0); directions.len()], 8192);
+        for k in 0..n {
+            let w = sphere_direction(k, n, [0, 0]).as_dvec3().to_array();
             let cell = &mut cells[directions.nearest(w)];
             *cell = (cell.0 + self.around(w), cell.1 + 1.0);
         }
