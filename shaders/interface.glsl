@@ -22,6 +22,9 @@ const uint DEPTH_BINS = 768u;         // bins of that sort: 32 an octave, from 1
 const uint BIN_LANES = 64u;           // invocations that write the tiles' lists, each a part of all entries without gaps
 const uint TILE_SIDE = 8u;            // pixels along a side of a tile
 const uint SIGHT_TEXELS = 8u;         // 16-byte words of a tree's record for finding its visible samples
+const uint MESH_TREES = 4096u;        // most trees in view that are meshes: 12 bits of what a sample sees
+const uint MESH_TRIANGLES = 524288u;  // most triangles of a mesh: 19 bits of it
+const uint MESH_SEEN = 0x80000000u;   // of what a sample sees: a mesh's tree << 19 | triangle, not a quad of the ground
 const uint COVER_SCRATCH = 16u;       // coverage tiles of one scratch word a texel that the scratch buffer holds
 const float FADE_FIRST = 0.9;         // part of its range at which the first of a species' trees has faded out
 const float FADE_SPREAD = 0.1;        // and how much later the last has, each at a time of its own
@@ -68,6 +71,7 @@ struct Species {
     vec3 reflectance;                 // of the crown's leaves and twigs, at phase angle 0
     float extinction;                 // tau of the crown's self-shadow, 1/(m rad)
     vec3 transmittance;               // of the crown's leaves
+    float mesh_range;                 // distance to which trees are their model's mesh, m; 0: none is
     float range;                      // s_max: distance to which trees are drawn one by one, m; 0: none is
     float crown_radius;               // sqrt(A / pi), m
     float bounding_radius;            // of a sphere about o, m
@@ -170,7 +174,7 @@ struct Tree {
     vec3 sun;                         // radiance of a lit leaf at height 0: phase function, hotspot, irradiance and correction
     uint hole_change;                 // halves: 1 / squared radius of the hole around it, 1/m2; change of `sun` with the height, over it
     vec3 sky;                         // radiance of a leaf under the whole sky
-    uint cascade;                     // for its shadow lookups
+    uint cascade_tint;                // cascade for its shadow lookups | samples in which it is its mesh << 8 | tint as a half << 16
     vec3 mean_sun;                    // average radiance from the sun, times nu of BN12 eq. 22
     uint own_lit;                     // halves: 1 - nu, weight of the tree's own light; correction of its lit share at height 0
     vec3 mean_sky;                    // average radiance from the sky, times nu
@@ -200,6 +204,30 @@ struct CasterQuad {
     uint region;                      // its region in the seed buffer
     uint block;                       // index
     uint base;                        // first record of the block
+};
+
+// A draw of a species' mesh, without indices, and where its trees and triangles are.
+struct MeshDraw {
+    uint vertex_count;                // corners
+    uint instance_count;              // trees
+    uint first_vertex;                // first corner
+    uint first_instance;              // 0
+    uint first_tree;                  // in the list of trees that are meshes
+    uint first_face;                  // of all meshes' triangles
+    uint face_count;                  // triangles
+};
+
+// What finding the trees that are meshes takes.
+struct MeshParameters {
+    uint bins;                        // distance bins that can have some
+    uint species_count;               // of the scene
+};
+
+// A triangle of a mesh.
+struct MeshFace {
+    uint mask;                        // layer of the array of masks; NO_PAGE: no holes
+    uint foliage;                     // 1: a leaf; 0: bark
+    uvec2 spare;                      // a texel has four words
 };
 
 // A tree that casts.

@@ -1,6 +1,6 @@
 //! The ladder: what stands for a tree, from near to far, and where one rung hands over to the next.
 //!
-//! A user writes it as `zfield:4,shader-map`: rungs, each with the apparent height of a tree in pixels down to which it is
+//! A user writes it as `mesh:256,zfield:4,shader-map`: rungs, each with the apparent height of a tree in pixels down to which it is
 //! used, and the last without, because it goes on to the horizon. Where a rung says no height the knob does that is for it.
 //!
 //! Hand-overs are one band of the range (BN12, section 7): each tree fades over a tenth of its range at a time of its own, and what
@@ -16,6 +16,8 @@ use crate::settings::{KNOBS, Settings, nearest};
 /// One way to stand for a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rung {
+    /// The model's own triangles, lit leaf by leaf (BBP08).
+    Mesh,
     /// A quad a tree, which shows three of its depth views (BN12, section 5).
     ZField,
     /// A shader of the ground, for all trees together (BN12, section 6).
@@ -23,12 +25,12 @@ pub enum Rung {
 }
 
 /// Number of rungs.
-const RUNGS: usize = 2;
+const RUNGS: usize = 3;
 
 impl Rung {
     /// All, near to far, with the names that users write.
     pub const NAMES: [(&'static str, Rung); RUNGS] =
-        [("zfield", Rung::ZField), ("shader-map", Rung::ShaderMap)];
+        [("mesh", Rung::Mesh), ("zfield", Rung::ZField), ("shader-map", Rung::ShaderMap)];
 
     /// The name that users write.
     pub fn name(self) -> &'static str {
@@ -58,11 +60,11 @@ impl Default for Ladder {
 
 impl Ladder {
     /// z-fields near, the shader-map far: what scenes have that say nothing.
-    pub const AUTO: Ladder = Ladder { steps: [step(Rung::ZField), step(Rung::ShaderMap)] };
+    pub const AUTO: Ladder = Ladder { steps: [step(Rung::ZField), step(Rung::ShaderMap), None] };
     /// z-fields at any distance.
-    pub const ZFIELD: Ladder = Ladder { steps: [step(Rung::ZField), None] };
+    pub const ZFIELD: Ladder = Ladder { steps: [step(Rung::ZField), None, None] };
     /// The shader-map at any distance.
-    pub const SHADER_MAP: Ladder = Ladder { steps: [step(Rung::ShaderMap), None] };
+    pub const SHADER_MAP: Ladder = Ladder { steps: [step(Rung::ShaderMap), None, None] };
 
     /// Ladders that have a name of their own.
     pub const SHORTHANDS: [(&'static str, Ladder); 3] =
@@ -83,6 +85,11 @@ impl Ladder {
         self.has(Rung::ZField)
     }
 
+    /// Whether the nearest of them are their models' meshes.
+    pub fn meshes(&self) -> bool {
+        self.has(Rung::Mesh)
+    }
+
     /// Whether a rung shows the average of a forest.
     pub fn averages(&self) -> bool {
         self.has(Rung::ShaderMap)
@@ -98,15 +105,31 @@ impl Ladder {
         let mut rest = self.steps.iter_mut().flatten().peekable();
         while let Some(step) = rest.next() {
             if rest.peek().is_some() {
-                step.pixels = step.pixels.or(Some(f64::from(settings.zfield_min_pixels)));
+                let knob = if step.rung == Rung::Mesh {
+                    settings.mesh_min_pixels
+                } else {
+                    settings.zfield_min_pixels
+                };
+                step.pixels = step.pixels.or(Some(f64::from(knob)));
             }
         }
         self
     }
 
+    /// Apparent height under which a rung is no longer used, pixels; 0 where it goes on to the horizon.
+    fn pixels_of(&self, rung: Rung, settings: &Settings) -> f64 {
+        let resolved = self.resolved(settings);
+        resolved.steps.iter().flatten().find(|s| s.rung == rung).and_then(|s| s.pixels).unwrap_or(0.0)
+    }
+
     /// Apparent height under which trees are no longer drawn one by one, pixels; 0 where they always are.
     pub fn least_pixels(&self, settings: &Settings) -> f64 {
-        self.resolved(settings).steps.iter().flatten().find_map(|s| s.pixels).unwrap_or(0.0)
+        self.pixels_of(Rung::ZField, settings)
+    }
+
+    /// Distance to which trees are meshes that would be `pixels` high at one metre, m; 0 where none is.
+    pub fn mesh_range(&self, settings: &Settings, pixels: f64) -> f64 {
+        if self.meshes() { pixels / self.pixels_of(Rung::Mesh, settings) } else { 0.0 }
     }
 
     /// Distance to which trees are drawn one by one that would be `pixels` high at one metre, m: to where they hand over, or, where
@@ -116,6 +139,17 @@ impl Ladder {
             (false, _) => 0.0,
             (true, true) => pixels / self.least_pixels(settings),
             (true, false) => farthest / fade_begin(),
+        }
+    }
+
+    /// That heights written down grow smaller from rung to rung, or what is wrong and the remedy.
+    fn descends(&self) -> Result<(), (String, String)> {
+        let written: Vec<f64> = self.steps.iter().flatten().filter_map(|s| s.pixels).collect();
+        match written.iter().zip(written.iter().skip(1)).find(|(near, far)| near <= far) {
+            Some((near, far)) => {
+                Err((format!("{far} pixels behind {near}"), "write smaller heights from rung to rung".into()))
+            }
+            None => Ok(()),
         }
     }
 
@@ -195,18 +229,35 @@ impl FromStr for Ladder {
                 return Err(wrong(what, remedy));
             }
             let pixels = match pixels {
-                Some(given) if k + 1 == parts.len() => {
+                Some(given) if k + 1 == parts.len() && rung != Rung::Mesh => {
                     let what = "the last rung goes on to the horizon".to_string();
                     return Err(wrong(what, format!("leave out \":{given}\", or write a rung behind it")));
                 }
-                Some(given) => Some(height(given).map_err(|(what, remedy)| wrong(what, remedy))?),
+                Some(given) => Some(height(rung, given).map_err(|(what, remedy)| wrong(what, remedy))?),
                 None => None,
             };
+            if last == Some(Rung::Mesh) && rung != Rung::ZField {
+                let what = format!("{name} behind mesh");
+                return Err(wrong(
+                    what,
+                    "meshes hand over to z-fields: write mesh:256,zfield:4,shader-map".into(),
+                ));
+            }
             // Rungs ascend, so there are no more than steps.
             steps[k] = Some(Step { rung, pixels });
             last = Some(rung);
         }
-        Ok(Ladder { steps })
+        let ladder = Ladder { steps };
+        if last == Some(Rung::Mesh) {
+            return Err(LadderError {
+                what: format!("\"{text}\": mesh at any distance"),
+                remedy: "meshes hand over to z-fields: write mesh:256,zfield:4,shader-map".into(),
+            });
+        }
+        ladder
+            .descends()
+            .map_err(|(what, remedy)| LadderError { what: format!("\"{text}\": {what}"), remedy })?;
+        Ok(ladder)
     }
 }
 
@@ -222,13 +273,17 @@ fn rung(name: &str) -> Result<Rung, (String, String)> {
 }
 
 /// An apparent height in pixels, in the range of the knob that it takes the place of.
-fn height(text: &str) -> Result<f64, (String, String)> {
-    let range = KNOBS.iter().find(|k| k.name == "zfield_min_pixels").map_or(0.0..=0.0, |k| k.min..=k.max);
+fn height(rung: Rung, text: &str) -> Result<f64, (String, String)> {
+    let (knob, example) = match rung {
+        Rung::Mesh => ("mesh_min_pixels", "mesh:256"),
+        _ => ("zfield_min_pixels", "zfield:4"),
+    };
+    let range = KNOBS.iter().find(|k| k.name == knob).map_or(0.0..=0.0, |k| k.min..=k.max);
     match text.parse::<f64>() {
         Ok(pixels) if range.contains(&pixels) => Ok(pixels),
         _ => Err((
             format!("\"{text}\" is no height that a rung is used down to"),
-            format!("write {} to {} pixels, such as zfield:4", range.start(), range.end()),
+            format!("write {} to {} pixels, such as {example}", range.start(), range.end()),
         )),
     }
 }
@@ -241,9 +296,14 @@ mod tests {
 
     #[test]
     fn what_is_printed_is_what_was_written() {
-        for text in
-            ["zfield:4,shader-map", "zfield:0.25,shader-map", "zfield,shader-map", "zfield", "shader-map"]
-        {
+        for text in [
+            "mesh:256,zfield:4,shader-map",
+            "mesh,zfield",
+            "zfield:0.25,shader-map",
+            "zfield,shader-map",
+            "zfield",
+            "shader-map",
+        ] {
             assert_eq!(text.parse::<Ladder>().unwrap().to_string(), text);
         }
         assert_eq!(
@@ -262,9 +322,18 @@ mod tests {
     #[test]
     fn what_is_no_ladder_is_refused_with_the_place_and_a_remedy() {
         for (text, what, remedy) in [
-            ("", "rung 1 of \"\": no name", "the rungs are: zfield, shader-map"),
-            ("mesh:256,zfield:4,shader-map", "rung 1 of", "the rungs are: zfield, shader-map"),
-            ("zfield:4,shells", "no rung \"shells\"", "the rungs are: zfield, shader-map"),
+            ("", "rung 1 of \"\": no name", "the rungs are: mesh, zfield, shader-map"),
+            ("mesh", "mesh at any distance", "write mesh:256,zfield:4,shader-map"),
+            ("mesh:256", "mesh at any distance", "write mesh:256,zfield:4,shader-map"),
+            (
+                "mesh:256,shader-map",
+                "rung 2 of \"mesh:256,shader-map\": shader-map behind mesh",
+                "hand over to z-fields",
+            ),
+            ("mesh:8,zfield:4", "\"8\" is no height", "16 to 65536 pixels, such as mesh:256"),
+            ("mesh:16,zfield:32,shader-map", "32 pixels behind 16", "smaller heights"),
+            ("zfield:4,mesh:256", "mesh after zfield", "near to far"),
+            ("zfield:4,shells", "no rung \"shells\"", "the rungs are: mesh, zfield, shader-map"),
             ("zfeild", "no rung \"zfeild\"", "did you mean \"zfield\"?"),
             ("zfield:4", "the last rung goes on to the horizon", "leave out \":4\""),
             ("zfield:4,shader-map:2", "rung 2 of", "leave out \":2\""),
@@ -295,6 +364,10 @@ mod tests {
         assert_eq!(Ladder::AUTO.resolved(&settings).to_string(), "zfield:5,shader-map");
         assert_eq!(four.resolved(&settings), four);
         assert_eq!(Ladder::SHADER_MAP.range(&settings, 1000.0, 3000.0), 0.0);
+        let near: Ladder = "mesh:200,zfield,shader-map".parse().unwrap();
+        assert_eq!((near.mesh_range(&settings, 1000.0), near.range(&settings, 1000.0, 3000.0)), (5.0, 200.0));
+        assert_eq!(near.resolved(&settings).to_string(), "mesh:200,zfield:5,shader-map");
+        assert_eq!(Ladder::AUTO.mesh_range(&settings, 1000.0), 0.0);
         // The farthest tree of z-fields alone is opaque, and nothing is handed over there.
         let relative = 3000.0 / Ladder::ZFIELD.range(&settings, 1000.0, 3000.0);
         assert!((handover::tree_fade(relative, 0.0) - 1.0).abs() < 1e-6 && relative > 0.79);

@@ -81,6 +81,8 @@ knobs! {
     transfer_bands: u32, "", 0..=2, [0, 1, 2], bake [0, 1, 2], "bands of light transfer, which knows from where the sun reaches each texel's leaves (0: none); each a quarter of the views' memory and three texel fetches a fragment";
     occlusion_rays: u32, "", 8..=1024, [32, 64, 128], bake [16, 32, 64, 128, 256], "rays a cell for baked ambient occlusion; bake time";
     samples: u32, "", 1..=8, [4, 4, 8], draw [1, 4, 8], "samples a pixel (1, 4 or 8, as far as the device goes): levels of opacity; fill cost";
+    mesh_min_pixels: f32, "px", 16.0..=65536.0, [384.0, 256.0, 192.0], draw [], "apparent tree height under which trees are no longer their models' meshes, where the ladder has that rung; cost grows with its inverse square";
+    leaf_directions: u32, "", 8..=26, [8, 14, 26], bake [], "directions (8, 14 or 26) in which a leaf of a mesh knows the crown around it (BBP08: 8); memory, and time a pixel of mesh, grow in proportion";
     zfield_min_pixels: f32, "px", 0.25..=64.0, [6.0, 4.0, 3.0], draw [8.0, 6.0, 4.0, 3.0, 2.0, 1.5], "apparent tree height under which trees are no longer drawn one by one; cost grows with its inverse square";
     convergence: f32, "", 0.1..=0.8, [0.4, 0.45, 0.45], draw [0.3, 0.4, 0.45, 0.6, 0.8], "part of the tree-by-tree range at which light and shadow have become the averages of the tables (BN12, eq. 22-25: 0.8); cost of shadows grows with the square";
     silhouette_min_pixels: f32, "px", 0.25..=64.0, [1.0, 1.0, 1.0], draw [2.0, 1.0, 0.5], "apparent height under which trees on the silhouettes of ridges are no longer drawn either; from zfield_min_pixels on they are as others";
@@ -123,10 +125,15 @@ impl Settings {
         let whole = !knob.whole || value.fract() == 0.0;
         let power = !matches!(name, "view_resolution" | "coverage_size" | "cascade_size")
             || (value as u64).is_power_of_two();
-        let samples = name != "samples" || matches!(value as u32, 1 | 4 | 8);
-        if !value.is_finite() || value < knob.min || value > knob.max || !whole || !power || !samples {
+        let one_of = match name {
+            "samples" => matches!(value as u32, 1 | 4 | 8),
+            "leaf_directions" => matches!(value as u32, 8 | 14 | 26),
+            _ => true,
+        };
+        if !value.is_finite() || value < knob.min || value > knob.max || !whole || !power || !one_of {
             let kind = match name {
                 "samples" => "1, 4 or 8, ",
+                "leaf_directions" => "8, 14 or 26, ",
                 _ if !power || name.ends_with("_size") || name == "view_resolution" => "a power of two, ",
                 _ if knob.whole => "a whole number, ",
                 _ => "",

@@ -11,6 +11,7 @@
 #include "physics/forest.glsl"
 #include "physics/handover.glsl"
 #include "physics/shadow.glsl"
+#include "physics/masks.glsl"
 #include "forest/cull.glsl"
 #include "forest/members.glsl"
 
@@ -30,6 +31,7 @@ layout(constant_id = 0) const int VIEW_RINGS = 9;
 layout(constant_id = 1) const float VIEW_RESOLUTION = 256.0;
 layout(constant_id = 2) const float TABLE_ANGLES = 16.0;
 layout(constant_id = 3) const float TABLE_DENSITIES = 8.0;
+layout(constant_id = 5) const uint SAMPLES = 4u;
 layout(constant_id = 4) const bool PAIR_TABLES = true; // the sun's average light is known, and has a share
 layout(binding = 10) uniform sampler3D pair_table;
 layout(binding = 11) uniform sampler2DArray view_table;
@@ -122,7 +124,10 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     // What the hole leaves of it, brought to what is seen of the tables' forest along this direction.
     t.sky *= table_ground(view_table, table_zenith(slope.u.v, TABLE_ANGLES), table_density(thickness, kind.max_thickness, TABLE_DENSITIES),
                           species, TABLE_ANGLES, TABLE_DENSITIES).z;
-    t.cascade = cascade_at(v.cascade_far, v.cascade_count, distance);
+    // Rounded as opacities are, once a tree.
+    float mesh = kind.mesh_range > 0.0 ? tree_fade(distance / kind.mesh_range, unit(hash(s.identity ^ HASH_FADE))) : 0.0;
+    uint samples = covered_samples(mesh, unit(hash(s.identity ^ HASH_MESH)), SAMPLES);
+    t.cascade_tint = cascade_at(v.cascade_far, v.cascade_count, distance) | samples << 8u | packHalf2x16(vec2(0.0, tint));
     return t;
 }
 

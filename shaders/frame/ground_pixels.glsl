@@ -5,6 +5,7 @@
 #include "frame/tile.glsl"
 #include "frame/forest_node.glsl"
 #include "frame/shown.glsl"
+#include "frame/trees/meshes/seen.glsl"
 
 layout(binding = 1) uniform usamplerBuffer quads;   // of three texels
 layout(binding = 7) uniform samplerBuffer nodes;    // of four texels
@@ -20,7 +21,13 @@ layout(constant_id = 4) const bool SKY_DRAWN = false; // in the picture already,
 
 // Of one sample a pixel there is level 0 alone.
 float ground_depth(ivec2 pixel, int k) { return texelFetch(depth, ivec3(pixel, 0), k).r; }
-uint ground_quad(ivec2 pixel, int k) { return texelFetch(quads_seen, ivec3(pixel, 0), k).r; }
+uint surface_seen(ivec2 pixel, int k) { return texelFetch(quads_seen, ivec3(pixel, 0), k).r; }
+
+// The quad of the ground that a sample sees, counted from 1; 0 where it sees the sky, or a mesh before either.
+uint ground_quad(ivec2 pixel, int k) {
+    uint surface = surface_seen(pixel, k);
+    return is_mesh(surface) ? 0u : surface;
+}
 
 TerrainQuad fetch_quad(uint quad) {
     int at = int(quad) * 3;

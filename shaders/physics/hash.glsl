@@ -19,6 +19,7 @@ const uint HASH_TINT = 0x297a2d39u;
 const uint HASH_MASK = 0x1b56c4e9u;
 const uint HASH_DITHER = 0x7feb352du;
 const uint HASH_FADE = 0x846ca68bu;
+const uint HASH_MESH = 0x3c6ef372u;
 const uint HASH_THIN = 0x68e31da4u;
 const uint HASH_SPECIES = 0xb5297a4du;
 

@@ -6,6 +6,13 @@ uint covered_samples(float alpha, float dither, uint samples) {
     return uint(clamp(floor(alpha * float(samples) + dither), 0.0, float(samples)));
 }
 
+// The samples in which a tree is its mesh, so many of them from one that its dither's lower bits choose; in the others it is its z-field.
+// Both sides of the hand-over ask here, so that no sample has both or none.
+uint mesh_mask(uint count, uint dither_bits, uint samples) {
+    uint all = (1u << samples) - 1u, run = (1u << count) - 1u, first = dither_bits & (samples - 1u);
+    return (run << first | run >> (samples - first)) & all;
+}
+
 // Column k of a tree's row of the combination table: samples + 1 masks of `samples` bits, packed low first.
 uint mask_column(uvec3 row, uint k, uint samples) {
     uint bit = k * samples;

@@ -3,17 +3,21 @@
 //! - `.zfield`, the depth views with their occlusion, and the measured crown and optics: of the model and the knobs of views. All
 //!   else is made from these.
 //! - `.transfer`, the light transfer of the views: of these and of the number of bands, whose coefficients are fitted together.
+//! - `.envelopes`, the crown around each leaf ([`super::envelope`]): of the model and of the number of directions.
 //! - `.forest`, the tables of far forests ([`super::tables`]): of both.
 
 use std::path::{Path, PathBuf};
 
+use super::envelope::{Envelopes, Parts, RAYS};
 use super::file::{Fields, Format, load_or_build};
+use super::surface::Surface;
 use super::{
     BakeSettings, ForestSettings, SpeciesBake, Turned, bake_transfer, bake_views, check, load_or_measure,
 };
 use crate::Result;
 use crate::physics::correction::{Correction, TERMS};
 use crate::physics::crown::{Crown, Frame};
+use crate::physics::leaf::Directions;
 use crate::physics::tables::ForestTables;
 use crate::physics::transfer::Transfer;
 use crate::physics::views;
@@ -22,6 +26,7 @@ use crate::scene::{Mesh, OpticsOverride};
 
 const VIEWS: Format = Format { magic: *b"CANOPYZF", version: 14, extension: "zfield" };
 const TRANSFER: Format = Format { magic: *b"CANOPYLT", version: 4, extension: "transfer" };
+const ENVELOPES: Format = Format { magic: *b"CANOPYLE", version: 1, extension: "envelopes" };
 /// Numbers at the head of a file of views.
 const SCALARS: usize = 23 + 4 * TERMS;
 
@@ -138,6 +143,37 @@ impl<'a> Source<'a> {
         Ok(Some(state))
     }
 
+    /// The crown around each leaf in a number of directions, likewise.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] for a mesh without extent, or a number of directions that there is no rule of.
+    pub fn load_envelopes(&self, directions: u32) -> Result<(Envelopes, CacheState)> {
+        let wrong =
+            || crate::Error::Usage(format!("{directions} directions of a leaf; there are 8, 14 or 26"));
+        let rule = Directions::new(directions as usize).ok_or_else(wrong)?;
+        let surface = Surface::new(self.mesh)?;
+        let parts = Parts::new(self.mesh, &surface);
+        load_or_build(
+            (self.dir, &ENVELOPES, &envelopes_key(self.mesh, directions)),
+            &[4 * parts.count * rule.len()],
+            |read| Envelopes {
+                parts: parts.clone(),
+                thickness: read[0]
+                    .as_chunks::<4>()
+                    .0
+                    .iter()
+                    .map(|b| f64::from(f32::from_le_bytes(*b)))
+                    .collect(),
+                directions: rule.len(),
+            },
+            |built, put| {
+                put(&built.thickness.iter().flat_map(|t| (*t as f32).to_le_bytes()).collect::<Vec<u8>>())
+            },
+            || Ok(Envelopes::new(&surface, parts.clone(), &rule, RAYS, self.quiet)),
+            self.quiet,
+        )
+    }
+
     /// The tables of a forest of the species, likewise. Light transfer has a part in them: where they have to be measured, the
     /// bake gets its own first, if it has none, and `transfer` says from where.
     ///
@@ -184,6 +220,16 @@ fn transfer_key(views: &[u8; 32], bands: u32) -> Option<[u8; 32]> {
     (bands > 0).then(|| fields.key())
 }
 
+/// BLAKE3 of everything that the envelopes of a mesh depend on.
+fn envelopes_key(mesh: &Mesh, directions: u32) -> [u8; 32] {
+    let mut fields = Fields::new("canopy leaf envelopes");
+    for x in [ENVELOPES.version, directions, RAYS] {
+        fields.put(&x.to_le_bytes());
+    }
+    put_mesh(&mut fields, mesh);
+    fields.key()
+}
+
 /// BLAKE3 of everything that views depend on: geometry, masks and colours, optical overrides, the knobs of views and
 /// the version of the bake. Vertex normals, material names and light transfer have no part in it.
 pub fn views_key(mesh: &Mesh, optics: &OpticsOverride, settings: &BakeSettings) -> [u8; 32] {
@@ -199,6 +245,13 @@ pub fn views_key(mesh: &Mesh, optics: &OpticsOverride, settings: &BakeSettings) 
         put(rgb.as_ref().map_or(&[], bytemuck::bytes_of));
     }
     put(optics.extinction.as_ref().map_or(&[], bytemuck::bytes_of));
+    put_mesh(&mut fields, mesh);
+    fields.key()
+}
+
+/// Geometry, masks and colours of a mesh.
+fn put_mesh(fields: &mut Fields, mesh: &Mesh) {
+    let mut put = |bytes: &[u8]| fields.put(bytes);
     put(bytemuck::cast_slice(&mesh.positions));
     put(bytemuck::cast_slice(&mesh.uvs));
     let triangles: Vec<[u32; 4]> =
@@ -213,7 +266,6 @@ pub fn views_key(mesh: &Mesh, optics: &OpticsOverride, settings: &BakeSettings) 
         put(bytemuck::bytes_of(&size));
         put(rgba);
     }
-    fields.key()
 }
 
 fn scalars(b: &SpeciesBake) -> [f32; SCALARS] {

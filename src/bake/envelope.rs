@@ -3,7 +3,8 @@
 //! BBP08 multiply the solid angles of neighbour leaves sorted by distance, all as if they were seen from the front. Here rays are cast at
 //! the mesh, through leaf masks, bark included: the share of rays of a direction's cell of the sphere that leave the tree is e^(−t), and t the
 //! optical thickness. A leaf does not hide itself. Of a leaf places count as they are seen ([`thickness`]). A cell that no ray leaves has the
-//! thickness of half a ray.
+//! thickness of half a ray. Bark has envelopes as well, patch by patch, for the sky's light on it; what light leaves hand to each other knows
+//! leaves alone.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -23,53 +24,79 @@ const RAYS_A_PLACE: u32 = 32;
 /// Faces that hang together are one leaf up to this radius, as a part of the tree's half width; in larger ones each is its own.
 const LARGEST: f32 = 0.1;
 
-/// Leaves of a tree, and what each knows of the tree around it.
-#[derive(Clone, Debug)]
+/// Which faces of a surface share an envelope: those of a leaf, and of bark those whose middles lie in the same cube.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parts {
+    /// Part of every face of the surface; leaves come first.
+    pub of: Vec<u32>,
+    /// How many are leaves.
+    pub leaves: usize,
+    /// How many there are.
+    pub count: usize,
+}
+
+/// Parts of a tree, and what each knows of the tree around it.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Envelopes {
-    /// Leaf of every face of the surface; `None` for what is not foliage, where any is.
-    pub leaf_of: Vec<Option<u32>>,
-    /// Optical thickness of the tree in each direction, leaf after leaf.
+    /// Which faces are of which part.
+    pub parts: Parts,
+    /// Optical thickness of the tree in each direction, part after part: numbers of single precision, as they are kept and drawn.
     pub thickness: Vec<f64>,
-    /// Directions a leaf.
+    /// Directions a part.
     pub directions: usize,
 }
 
 impl Envelopes {
-    /// Casts `rays` a direction and leaf, on average.
-    pub fn new(mesh: &Mesh, surface: &Surface, directions: &Directions, rays: u32, quiet: bool) -> Self {
-        let (leaf_of, count) = leaves(mesh, surface);
-        let mut faces = vec![Vec::new(); count];
-        for (face, leaf) in leaf_of.iter().enumerate() {
-            if let Some(leaf) = leaf {
-                faces[*leaf as usize].push(face as u32);
-            }
+    /// Casts `rays` a direction and part, on average.
+    pub fn new(surface: &Surface, parts: Parts, directions: &Directions, rays: u32, quiet: bool) -> Self {
+        let mut faces = vec![Vec::new(); parts.count];
+        for (face, part) in parts.of.iter().enumerate() {
+            faces[*part as usize].push(face as u32);
         }
         let caster = Caster::new(surface);
-        let progress = Progress::new("baking envelopes of leaves", count as u64, quiet);
+        let progress = Progress::new("baking envelopes of leaves", faces.len() as u64, quiet);
         let thickness = faces
             .par_iter()
             .enumerate()
-            .map_init(Stack::new, |stack, (leaf, faces)| {
+            .map_init(Stack::new, |stack, (part, faces)| {
                 progress.step(1);
-                let own = |face: u32| leaf_of[face as usize] == Some(leaf as u32);
+                // A leaf does not hide itself; of bark, only the triangle where a ray begins does not.
                 let origin = |k| place(surface, faces, k);
-                thickness((&caster, own), origin, directions, rays, leaf as u32, stack)
+                let own = |from: u32, face: u32| {
+                    if part < parts.leaves { parts.of[face as usize] == part as u32 } else { face == from }
+                };
+                thickness((&caster, own), origin, directions, rays, part as u32, stack)
             })
             .flatten()
+            .map(|t| f64::from(t as f32))
             .collect();
         progress.finish();
-        Envelopes { leaf_of, thickness, directions: directions.len() }
+        Envelopes { parts, thickness, directions: directions.len() }
     }
 
-    /// Number of leaves.
-    pub fn count(&self) -> usize {
-        self.thickness.len() / self.directions
-    }
-
-    /// What a leaf knows.
-    pub fn of(&self, leaf: u32) -> &[f64] {
-        let first = leaf as usize * self.directions;
+    /// What a face's part knows.
+    pub fn of(&self, face: u32) -> &[f64] {
+        let first = self.parts.of[face as usize] as usize * self.directions;
         &self.thickness[first..first + self.directions]
+    }
+}
+
+impl Parts {
+    /// Faces of foliage that share a corner are one leaf. Without foliage all faces stand for leaves.
+    pub fn new(mesh: &Mesh, surface: &Surface) -> Self {
+        let (leaf_of, leaves) = leaves(mesh, surface);
+        let side = LARGEST * surface.frame.half_width;
+        let (mut cells, mut count) = (std::collections::HashMap::new(), leaves as u32);
+        let mut cell = |face: &Face| {
+            let middle = face.p.iter().map(|p| surface.frame.to_metres(*p)).sum::<Vec3>() / 3.0;
+            *cells.entry((middle / side).floor().as_ivec3()).or_insert_with(|| {
+                count += 1;
+                count - 1
+            })
+        };
+        let of = surface.faces.iter().zip(&leaf_of).map(|(face, leaf)| leaf.unwrap_or_else(|| cell(face)));
+        let of = of.collect();
+        Parts { of, leaves, count: count as usize }
     }
 }
 
@@ -120,13 +147,14 @@ fn root(parent: &mut [u32], mut k: u32) -> u32 {
     k
 }
 
-/// Point k of an even sequence over a leaf's faces in turn, m; where its masks leave nothing, their middles.
-fn place(surface: &Surface, faces: &[u32], k: u32) -> Vec3 {
-    let face = &surface.faces[faces[k as usize % faces.len()] as usize];
+/// Point k of an even sequence over a part's faces in turn, m, and the face; where its masks leave nothing, their middles.
+fn place(surface: &Surface, faces: &[u32], k: u32) -> (Vec3, u32) {
+    let on = faces[k as usize % faces.len()];
+    let face = &surface.faces[on as usize];
     let [a, b, c] = face.p.map(|p| surface.frame.to_metres(p));
     // One of a few next places that are no holes.
     let (s, t) = (0..8).find_map(|more| surface.spread(face, 8 * k + more)).unwrap_or((1.0 / 3.0, 1.0 / 3.0));
-    a + (b - a) * s + (c - a) * t
+    (a + (b - a) * s + (c - a) * t, on)
 }
 
 /// Thickness around what is seen of a leaf, from all sides on average.
@@ -135,8 +163,8 @@ fn place(surface: &Surface, faces: &[u32], k: u32) -> Vec3 {
 /// finds there, V (1 or 0), has the mean Σ o V / Σ o over places: more than Σ V, because open places are open to all. A ray's own V is left
 /// out of its place's o, or its noise would count as openness.
 fn thickness(
-    (caster, own): (&Caster, impl Fn(u32) -> bool),
-    origin: impl Fn(u32) -> Vec3,
+    (caster, own): (&Caster, impl Fn(u32, u32) -> bool),
+    origin: impl Fn(u32) -> (Vec3, u32),
     directions: &Directions,
     rays: u32,
     seed: u32,
@@ -146,7 +174,8 @@ fn thickness(
     // Rays, those that leave, and the same weighted by openness.
     let mut cells = vec![[0u32; 4]; directions.len()];
     for place in 0..places {
-        let (origin, seeds) = (origin(place), [0, 1].map(|half| hash2(seed, 2 * place + half)));
+        let ((origin, on), seeds) = (origin(place), [0, 1].map(|half| hash2(seed, 2 * place + half)));
+        let own = |face| own(on, face);
         let found: [(usize, bool); RAYS_A_PLACE as usize] = std::array::from_fn(|k| {
             let w = sphere_direction(k as u32, RAYS_A_PLACE, seeds);
             (directions.nearest(w.as_dvec3().to_array()), !caster.occluded_by_others(origin, w, &own, stack))
@@ -208,7 +237,8 @@ mod tests {
             square(&mut mesh, [1000.0, 1.0], 0.25);
         }
         let surface = Surface::new(&mesh).unwrap();
-        Envelopes::new(&mesh, &surface, &Directions::new(26).unwrap(), 64, true)
+        let parts = Parts::new(&mesh, &surface);
+        Envelopes::new(&surface, parts, &Directions::new(26).unwrap(), 64, true)
     }
 
     #[test]
@@ -216,8 +246,8 @@ mod tests {
         let directions = Directions::new(26).unwrap();
         let (open, roofed) = (envelopes(false), envelopes(true));
         // Faces that share corners are one leaf; a roof of two faces larger than a leaf can be is two.
-        assert_eq!((open.count(), roofed.count()), (4, 5));
-        assert_eq!(open.leaf_of[..4], [Some(0), Some(0), Some(1), Some(1)]);
+        assert_eq!((open.parts.count, roofed.parts.count), (4, 5));
+        assert_eq!((open.parts.leaves, &open.parts.of[..4]), (4, &[0, 0, 1, 1][..]));
         for (k, w) in directions.to.iter().enumerate() {
             // The small square below takes a thousandth of the lower cell.
             assert!(open.of(0)[k] < 0.1, "{w:?}: {}", open.of(0)[k]);

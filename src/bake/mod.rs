@@ -2,7 +2,7 @@
 
 pub mod cache;
 mod correction;
-pub(crate) mod envelope;
+pub mod envelope;
 #[doc(hidden)]
 pub mod file;
 mod least_squares;

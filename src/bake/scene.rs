@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::envelope::Envelopes;
 use super::{CacheState, ForestSettings, Source, SpeciesBake};
 use crate::Result;
 use crate::physics::tables::ForestTables;
@@ -16,6 +17,8 @@ pub struct Baked {
     pub species: Arc<SpeciesBake>,
     /// Its tables in the scene's forest.
     pub tables: Arc<ForestTables>,
+    /// The crown around its leaves, where it is drawn as a mesh.
+    pub envelopes: Option<Arc<Envelopes>>,
 }
 
 /// Where the parts of a [`Baked`] came from.
@@ -27,6 +30,8 @@ pub struct BakedFrom {
     pub transfer: Option<CacheState>,
     /// The tables.
     pub tables: CacheState,
+    /// The crown around its leaves; `None` where nothing needed it.
+    pub envelopes: Option<CacheState>,
 }
 
 /// What is needed of a scene's species.
@@ -39,16 +44,18 @@ pub struct Needs {
     /// The light transfer of the views, to draw trees one by one. Measuring tables needs it as well and gets it by itself; once
     /// they are in the cache, a plan without z-fields or without a sun does without.
     pub transfer: bool,
+    /// The crown around each leaf, to draw trees as meshes.
+    pub envelopes: bool,
 }
 
 impl Needs {
-    /// All, for whoever draws by several plans.
-    pub const ALL: Needs = Needs { trees: true, transfer: true };
+    /// All but what meshes take, for whoever draws by several plans.
+    pub const ALL: Needs = Needs { trees: true, transfer: true, envelopes: false };
 }
 
 impl From<&Plan> for Needs {
     fn from(plan: &Plan) -> Self {
-        Needs { trees: plan.forest, transfer: plan.transfer_bands > 0 }
+        Needs { trees: plan.forest, transfer: plan.transfer_bands > 0, envelopes: plan.meshes }
     }
 }
 
@@ -99,8 +106,15 @@ pub fn load_or_bake_scene(
         let mut transfer = if needs.transfer { source.load_transfer(&mut species)? } else { None };
         let (measured, tables) =
             source.load_tables(&forest_settings(scene, k), &mut species, &mut transfer)?;
-        let one = Baked { species: Arc::new(species), tables: Arc::new(measured) };
-        all.push((one, BakedFrom { views, transfer, tables }));
+        let around = || source.load_envelopes(scene.settings.leaf_directions);
+        let around = needs.envelopes.then(around).transpose()?;
+        let envelopes = around.as_ref().map(|a| a.1);
+        let one = Baked {
+            species: Arc::new(species),
+            tables: Arc::new(measured),
+            envelopes: around.map(|a| Arc::new(a.0)),
+        };
+        all.push((one, BakedFrom { views, transfer, tables, envelopes }));
     }
     Ok(all)
 }

@@ -51,9 +51,23 @@ impl Mask {
         })
     }
 
+    /// Opacity at texture coordinates, × 255, scaled so that there is a surface from a half on.
+    pub fn opacity(&self, uv: Vec2) -> u8 {
+        let scaled = 127.5 * f64::from(self.sum(uv)) / f64::from(self.threshold.max(1));
+        // From where on there is one, to the bit.
+        let least = if self.opaque(uv) { 128.0 } else { 0.0 };
+        scaled.clamp(least, if least > 0.0 { 255.0 } else { 127.0 }) as u8
+    }
+
     /// Whether there is a surface at texture coordinates `uv` ≥ 0, which wrap around: bilinear, 8 bits of fraction.
     #[inline]
     pub fn opaque(&self, uv: Vec2) -> bool {
+        self.sum(uv) >= self.threshold
+    }
+
+    /// The four alphas around, weighted.
+    #[inline]
+    fn sum(&self, uv: Vec2) -> u32 {
         // Half a texel back, and a whole texture on so that it stays positive.
         let x = ((uv.x + 1.0) * (self.width * 256) as f32 - 128.0) as u32;
         let y = ((uv.y + 1.0) * (self.height * 256) as f32 - 128.0) as u32;
@@ -64,7 +78,7 @@ impl Mask {
         let at = |i: u32| u32::from(self.alpha[i as usize]);
         let low = at(y0 + x0) * (256 - fx) + at(y0 + x1) * fx;
         let high = at(y1 + x0) * (256 - fx) + at(y1 + x1) * fx;
-        low * (256 - fy) + high * fy >= self.threshold
+        low * (256 - fy) + high * fy
     }
 }
 

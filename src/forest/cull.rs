@@ -44,7 +44,8 @@ pub struct CullData {
     /// Class of every seed, workgroup after workgroup.
     pub classes: Buffer,
     counts: Buffer,
-    starts: Buffer,
+    /// Where the bins begin in the lists.
+    pub starts: Buffer,
     programs: [Program; 4],
     capacity: u32,
     /// Distances under which a tree's texels may be magnified, from which it covers few pixels, and from which its light
@@ -58,6 +59,8 @@ pub struct CullData {
 pub struct TreeCounts {
     /// Trees in view.
     pub camera: u32,
+    /// Of these, those that are meshes.
+    pub meshes: u32,
     /// Casters drawn into each cascade: those of pages that frames before have not left.
     pub cascades: Vec<u32>,
 }
@@ -75,6 +78,7 @@ impl CullData {
             ("TABLE_ANGLES", float(tables.angles)),
             ("TABLE_DENSITIES", float(tables.densities)),
             ("PAIR_TABLES", u32::from(plan.pair_tables)),
+            ("SAMPLES", plan.samples),
         ];
         Ok(CullData {
             trees: gpu.described_buffer(&plan.buffer(resource::TREES))?,
@@ -94,6 +98,11 @@ impl CullData {
             draw_limits: plan.draw_limits,
             last: plan.last_range(),
         })
+    }
+
+    /// How many of the distance bins have trees that are nearer than this, m.
+    pub fn bins_within(&self, distance: f64) -> u32 {
+        first_bin_from(distance, self.last)
     }
 
     /// Takes the distances of another plan.

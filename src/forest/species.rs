@@ -117,6 +117,9 @@ impl SpeciesData {
         for (row, range) in self.rows.iter_mut().zip(&plan.species_range) {
             row.range = *range as f32;
         }
+        for (row, range) in self.rows.iter_mut().zip(&plan.mesh_range) {
+            row.mesh_range = if plan.meshes { *range as f32 } else { 0.0 };
+        }
         gpu.upload(&self.table, 0, &block(&self.rows))
     }
 
@@ -233,7 +236,7 @@ fn rows(
 ) -> Vec<Row> {
     let mut next_map = 0;
     let mut rows = Vec::new();
-    for (k, (species, Baked { species: bake, tables })) in scene.species.iter().zip(baked).enumerate() {
+    for (k, (species, Baked { species: bake, tables, .. })) in scene.species.iter().zip(baked).enumerate() {
         let (mut max_density, mut between, mut slope) = (0.0, None, None);
         if let Distribution::Density { max_density: d, between_heights, below_slope, .. } =
             &species.distribution
@@ -264,6 +267,7 @@ fn rows(
             lit: coefficients(&crown.lit),
             sent: coefficients(&bake.sent()),
             transmittance,
+            mesh_range: if plan.meshes { plan.mesh_range[k] as f32 } else { 0.0 },
             range: plan.species_range[k] as f32,
             crown_radius: crown.radius,
             bounding_radius: crown.frame.half_width.hypot(crown.frame.half_height),

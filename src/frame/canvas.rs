@@ -7,6 +7,7 @@ use super::seen_ground::SeenGround;
 use super::stream::{Moment, Streamed};
 use super::targets::ImageTargets;
 use super::tonemap::Tonemap;
+use super::trees::meshes::Meshes;
 use super::trees::tiles::TreeTiles;
 use super::trees::zfield::Trees;
 use super::world::World;
@@ -28,7 +29,28 @@ enum Passes {
     /// The graphics pipeline: what it finds it lights.
     Graphics(Box<Ground>, Option<Box<Trees>>),
     /// Compute tiles: what is seen is found first, and lit once.
-    Tiles(Box<SeenGround>, Option<Horizon>, Option<Box<TreeTiles>>),
+    Tiles(Box<Seen>),
+}
+
+/// Passes by which surfaces are seen first.
+struct Seen {
+    ground: SeenGround,
+    horizon: Option<Horizon>,
+    meshes: Option<Meshes>,
+    trees: Option<TreeTiles>,
+}
+
+impl Seen {
+    fn new(gpu: &Gpu, (scene, plan): (&Scene, &Plan), world: &World) -> Result<Self> {
+        let rows = world.near().map(|(forest, _)| forest.species.mask_rows);
+        let meshes = world.meshes().filter(|_| plan.shows_meshes());
+        Ok(Seen {
+            ground: SeenGround::new(gpu, scene, plan)?,
+            horizon: Horizon::new(gpu, scene, plan)?,
+            meshes: meshes.map(|(_, _, data)| Meshes::new(gpu, scene, plan, data)).transpose()?,
+            trees: rows.map(|rows| TreeTiles::new(gpu, scene, plan, rows)).transpose()?,
+        })
+    }
 }
 
 impl Canvas {
@@ -37,20 +59,15 @@ impl Canvas {
     /// # Errors
     /// [`crate::Error::Device`] when out of memory.
     pub fn new(gpu: &Gpu, (scene, plan): (&Scene, &Plan), world: &World) -> Result<Self> {
-        let rows = world.near().map(|(forest, _)| forest.species.mask_rows);
         Ok(Canvas {
             targets: ImageTargets::new(gpu, plan)?,
             passes: match plan.rasterizer {
                 Rasterizer::Graphics => {
+                    let rows = world.near().map(|(forest, _)| forest.species.mask_rows);
                     let trees = rows.map(|rows| Trees::new(gpu, scene, plan, rows)).transpose()?;
                     Passes::Graphics(Box::new(Ground::new(gpu, plan)?), trees.map(Box::new))
                 }
-                Rasterizer::Tiles => {
-                    let trees = rows.map(|rows| TreeTiles::new(gpu, scene, plan, rows)).transpose()?;
-                    let horizon = Horizon::new(gpu, scene, plan)?;
-                    let ground = SeenGround::new(gpu, scene, plan)?;
-                    Passes::Tiles(Box::new(ground), horizon, trees.map(Box::new))
-                }
+                Rasterizer::Tiles => Passes::Tiles(Box::new(Seen::new(gpu, (scene, plan), world)?)),
             },
             tonemap: Tonemap::new(gpu, plan)?,
         })
@@ -77,10 +94,7 @@ impl Canvas {
                 Passes::Graphics(pass, trees) => {
                     self.graphics(r, world, streamed, moment, (pass, trees.as_deref()));
                 }
-                Passes::Tiles(pass, horizon, trees) => {
-                    let shown = trees.as_deref().filter(|_| plan.shows_trees());
-                    self.tiles(r, world, streamed, moment, (pass, horizon.as_ref(), shown));
-                }
+                Passes::Tiles(passes) => self.tiles(r, plan, world, streamed, moment, passes),
             }
         });
     }
@@ -109,17 +123,22 @@ impl Canvas {
     fn tiles(
         &self,
         r: &mut Recorder,
+        plan: &Plan,
         world: &World,
         streamed: &Streamed,
         moment: Moment,
-        (pass, horizon, trees): (&SeenGround, Option<&Horizon>, Option<&TreeTiles>),
+        passes: &Seen,
     ) {
         let (view, indices, map) = (&world.view, &world.terrain_indices, &world.shadows.map);
         let ground = (&world.terrain, &streamed.draws);
         let forest = world.forest.as_ref().zip(world.shader_map.as_ref());
-        let trees = trees.zip(world.near());
-        pass.see(r, view, indices, ground, &self.targets);
-        if let Some((horizon, far)) = horizon.zip(forest) {
+        let trees = passes.trees.as_ref().filter(|_| plan.shows_trees()).zip(world.near());
+        let meshes = passes.meshes.as_ref().zip(world.meshes());
+        passes.ground.see(r, view, indices, ground, &self.targets);
+        if let Some((pass, (_, cull, data))) = meshes {
+            pass.see(r, view, (cull, data, plan.last_mesh_range()), &self.targets);
+        }
+        if let Some((horizon, far)) = passes.horizon.as_ref().zip(forest) {
             if streamed.far_trees {
                 horizon.record(r, view, ground, far, &self.targets);
             } else {
@@ -130,7 +149,10 @@ impl Canvas {
             tiles.see(r, view, forest, cull, &self.targets);
         }
         let seen = trees.map(|(tiles, _)| &tiles.seen);
-        pass.light(r, view, ground, forest, map, seen, &self.targets);
+        passes.ground.light(r, view, ground, forest, map, seen, &self.targets);
+        if let Some(((pass, (forest, cull, data)), seen)) = meshes.zip(seen) {
+            pass.light(r, view, forest, (cull, data), map, seen, &self.targets);
+        }
         if let Some((tiles, (forest, cull))) = trees {
             tiles.shade(r, view, forest, cull, map, &self.targets);
         }
@@ -142,9 +164,18 @@ impl Canvas {
     }
 
     /// Has what the tiles find read back.
-    pub(super) fn read(&self, recorder: &mut Recorder, plan: &Plan, reads: &mut ReadBacks) -> Result<()> {
-        if let Passes::Tiles(_, _, Some(tiles)) = &self.passes {
-            reads.tiles = plan.shows_trees().then(|| tiles.read_state(recorder)).transpose()?;
+    pub(super) fn read(
+        &self,
+        recorder: &mut Recorder,
+        (plan, world): (&Plan, &World),
+        reads: &mut ReadBacks,
+    ) -> Result<()> {
+        let Passes::Tiles(passes) = &self.passes else { return Ok(()) };
+        if let Some(tiles) = passes.trees.as_ref().filter(|_| plan.shows_trees()) {
+            reads.tiles = Some(tiles.read_state(recorder)?);
+        }
+        if let Some((pass, (_, _, data))) = passes.meshes.as_ref().zip(world.meshes()) {
+            reads.meshes = Some(pass.read_draws(recorder, data)?);
         }
         Ok(())
     }

@@ -35,6 +35,7 @@ use canvas::Canvas;
 use report::{Began, ReadBacks};
 use shadows::Shadows;
 use stream::Moment;
+use trees::meshes::Meshes;
 use trees::tiles::TreeTiles;
 
 pub use report::{FrameReport, Ticket, Tiles};
@@ -150,7 +151,7 @@ impl Renderer {
         self.canvas.resolve(r, plan, moment);
         let mut reads = ReadBacks::default();
         self.world.read(r, moment.cascades.len(), &mut reads)?;
-        self.canvas.read(r, plan, &mut reads)?;
+        self.canvas.read(r, (plan, &self.world), &mut reads)?;
         drop(recording);
 
         let flight = info_span!("submit").in_scope(|| recorder.launch())?;
@@ -170,6 +171,9 @@ impl Renderer {
         let done = info_span!("wait").in_scope(|| flight.wait())?;
         if let Some(state) = &reads.tiles {
             TreeTiles::check(&done.get(state)[0])?;
+        }
+        if let Some(draws) = &reads.meshes {
+            Meshes::check(&done.get(draws))?;
         }
         let trees = reads.counts(&done);
         if let Some((_, cull)) = self.world.near() {

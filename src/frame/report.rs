@@ -2,7 +2,7 @@
 
 use crate::clock::{process_cpu_ms_since, process_cpu_ns};
 use crate::forest::cull::TreeCounts;
-use crate::gpu::interface::{DrawCommand, TileState, View};
+use crate::gpu::interface::{DrawCommand, MeshDraw, TileState, View};
 use crate::gpu::{Done, InFlight, Later, Timing};
 
 /// Contents of the caches, by cache.
@@ -75,6 +75,8 @@ impl Began {
 pub(super) struct ReadBacks {
     /// What the tiles found.
     pub tiles: Option<Later<TileState>>,
+    /// Draws of meshes.
+    pub meshes: Option<Later<MeshDraw>>,
     /// Trees in view.
     pub trees: Option<Later<u32>>,
     /// Draws of casters, and the cascade of each of a batch's.
@@ -86,9 +88,12 @@ pub(super) struct ReadBacks {
 impl ReadBacks {
     /// How many trees the frame drew.
     pub fn counts(&self, done: &Done) -> TreeCounts {
-        let mut counts = TreeCounts { camera: 0, cascades: vec![0; self.cascades] };
+        let mut counts = TreeCounts { cascades: vec![0; self.cascades], ..TreeCounts::default() };
         if let Some(total) = &self.trees {
             counts.camera = done.get(total)[0];
+        }
+        if let Some(draws) = &self.meshes {
+            counts.meshes = done.get(draws).iter().map(|d| d.instance_count).sum();
         }
         if let Some((commands, cascades)) = &self.casters {
             for (command, cascade) in done.get(commands).iter().zip(cascades.iter().cycle()) {

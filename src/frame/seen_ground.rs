@@ -52,6 +52,7 @@ impl SeenGround {
                     ("COVER_SIDE", plan.coverage_size),
                     ("SAMPLES", plan.samples),
                     ("TREES", u32::from(plan.shows_trees())),
+                    ("MESHES", u32::from(plan.shows_meshes())),
                     ("SKY_DRAWN", u32::from(plan.horizon() || matches!(scene.sky, Sky::LatLong { .. }))),
                     ("HAS_SUN", u32::from(plan.sun)),
                     ("SHADOWED", u32::from(plan.cascades > 0)),

@@ -107,6 +107,13 @@ impl World {
                 plan.last_range()
             )));
         }
+        if plan.ladder.meshes() && !plan.meshes && plan.mesh_in_range(extent, heights, eye.position) {
+            return Err(Error::Usage(format!(
+                "trees are within {:.0} m of this camera, where they are meshes, and the plan was made where none are: plan again for \
+                 this camera",
+                plan.last_mesh_range()
+            )));
+        }
         if !plan.trees_within(extent, heights, eye.position) {
             return Err(Error::Usage(format!(
                 "trees are farther than {:.0} m from this camera, and the plan was made where none is, so it does not draw them: plan \

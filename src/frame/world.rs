@@ -10,6 +10,7 @@ use crate::bake::Baked;
 use crate::forest::casters::CasterData;
 use crate::forest::coverage::CoverageData;
 use crate::forest::cull::CullData;
+use crate::forest::meshes::MeshData;
 use crate::forest::seeds::SeedData;
 use crate::forest::species::SpeciesData;
 use crate::forest::tables::TableData;
@@ -40,6 +41,8 @@ pub struct NearTrees {
     pub cull: CullData,
     /// What finds the trees that cast shadows, where there is a sun.
     pub casters: Option<CasterData>,
+    /// What the nearest are drawn from, where those are meshes.
+    pub meshes: Option<MeshData>,
 }
 
 /// What lives between frames whatever their size.
@@ -73,6 +76,7 @@ impl Forest {
         let near = || -> Result<NearTrees> {
             Ok(NearTrees {
                 cull: CullData::new(gpu, scene, plan, &tables)?,
+                meshes: plan.meshes.then(|| MeshData::new(gpu, scene, plan, baked)).transpose()?,
                 casters: (plan.cascades > 0).then(|| CasterData::new(gpu, scene, plan)).transpose()?,
             })
         };
@@ -170,6 +174,13 @@ impl World {
         self.forest.as_ref().and_then(|f| Some((f, &f.near.as_ref()?.cull)))
     }
 
+    /// The same with what the nearest of them are drawn from, where those are meshes.
+    pub fn meshes(&self) -> Option<(&Forest, &CullData, &MeshData)> {
+        let forest = self.forest.as_ref()?;
+        let near = forest.near.as_ref()?;
+        Some((forest, &near.cull, near.meshes.as_ref()?))
+    }
+
     /// What finds the trees that cast shadows.
     pub fn casters(&self) -> Option<&CasterData> {
         self.forest.as_ref()?.near.as_ref()?.casters.as_ref()
@@ -181,7 +192,7 @@ impl World {
 /// # Errors
 /// [`Error::Usage`] with what differs, or does not suffice.
 pub(super) fn served(scene: &Scene, held: &Plan, wanted: &Plan) -> Result<Plan> {
-    let same = |a: &Plan, b: &Plan| -> [(&str, bool); 8] {
+    let same = |a: &Plan, b: &Plan| -> [(&str, bool); 9] {
         let grid = |p: &Plan| [p.quad_side, p.tile_side, p.pattern_density, p.plain_side].map(f64::to_bits);
         [
             ("ladder", a.ladder == b.ladder),
@@ -189,6 +200,7 @@ pub(super) fn served(scene: &Scene, held: &Plan, wanted: &Plan) -> Result<Plan> 
             ("view mode", a.view_mode == b.view_mode),
             ("samples and layers", (a.samples, a.layers) == (b.samples, b.layers)),
             ("trees one by one", (a.z_fields, a.transfer_bands) == (b.z_fields, b.transfer_bands)),
+            ("meshes", a.meshes == b.meshes),
             ("tables", a.pair_tables == b.pair_tables),
             ("sun", (a.sun, a.cascades) == (b.sun, b.cascades)),
             ("seed quads", grid(a) == grid(b) && a.region_capacity == b.region_capacity),
@@ -219,6 +231,7 @@ pub(super) fn served(scene: &Scene, held: &Plan, wanted: &Plan) -> Result<Plan> 
         size: wanted.size,
         shadow_distance: wanted.shadow_distance,
         species_range: wanted.species_range.clone(),
+        mesh_range: wanted.mesh_range.clone(),
         range: wanted.range,
         silhouette_ratio: wanted.silhouette_ratio,
         draw_limits: wanted.draw_limits,

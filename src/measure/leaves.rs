@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::Result;
-use crate::bake::envelope::{Envelopes, RAYS};
+use crate::bake::envelope::{Envelopes, Parts, RAYS};
 use crate::bake::occlusion::sphere_direction;
 use crate::bake::optics::colours;
 use crate::bake::surface::{Caster, Surface};
@@ -222,10 +222,11 @@ impl Tree<'_> {
     /// The model beside the truth, pixel by pixel.
     fn agreement(&self, mesh: &Mesh, directions: &Directions, pixels: &[Pixel], quiet: bool) -> Agreement {
         let begun = std::time::Instant::now();
-        let envelopes = Envelopes::new(mesh, self.surface, directions, RAYS, quiet);
+        let parts = Parts::new(mesh, self.surface);
+        let envelopes = Envelopes::new(self.surface, parts, directions, RAYS, quiet);
         let bake_s = begun.elapsed().as_secs_f64();
         let sun = Sun::new(directions, self.leaf, self.sun().to_array());
-        let around = self.around_cells(directions);
+        let around = directions.means(|w| self.around(w));
         let model: Vec<[f64; 3]> =
             pixels.par_iter().map(|p| self.model(p, directions, &envelopes, &sun, &around)).collect();
         let squares = VIEWS.len() * (SIDE / SQUARE).pow(2) as usize;
@@ -245,18 +246,7 @@ impl Tree<'_> {
             Term { share: truth / total(3, 1), bias: total(term, 0) / truth - 1.0, error: apart / truth }
         };
         let terms = [term(0), term(1), term(2), term(3)];
-        Agreement { directions: directions.len(), leaves: envelopes.count(), bake_s, terms }
-    }
-
-    /// Mean radiance from around over the cell of each direction.
-    fn around_cells(&self, directions: &Directions) -> Vec<f64> {
-        let (mut cells, n) = (vec![(0.0, 0.0); directions.len()], 8192);
-        for k in 0..n {
-            let w = sphere_direction(k, n, [0, 0]).as_dvec3().to_array();
-            let cell = &mut cells[directions.nearest(w)];
-            *cell = (cell.0 + self.around(w), cell.1 + 1.0);
-        }
-        cells.into_iter().map(|(sum, count)| sum / f64::max(count, 1.0)).collect()
+        Agreement { directions: directions.len(), leaves: envelopes.parts.leaves, bake_s, terms }
     }
 
     /// Sky, sun and bounce of a pixel by its leaf's envelope (BBP08 eq. 6, 8 and 11).
@@ -268,8 +258,7 @@ impl Tree<'_> {
         sun: &Sun,
         around: &[f64],
     ) -> [f64; 3] {
-        let Some(leaf) = envelopes.leaf_of[p.face as usize] else { return [0.0; 3] };
-        let (envelope, gather) = (envelopes.of(leaf), Gather::new(directions, p.normal));
+        let (envelope, gather) = (envelopes.of(p.face), Gather::new(directions, p.normal));
         let direct = scattering(self.leaf, p.normal, p.viewer, self.sun().to_array());
         [
             gather.radiance(self.leaf, p.side, |k| (-envelope[k]).exp() * around[k]),

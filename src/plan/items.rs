@@ -88,6 +88,9 @@ impl Plan {
         if self.z_fields {
             self.list_views(scene, &mut items);
         }
+        if self.meshes {
+            self.list_meshes(scene, &mut items);
+        }
         if self.forest {
             self.list_tables(scene, &mut items);
             self.list_distribution(scene, &mut items);

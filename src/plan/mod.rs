@@ -5,6 +5,7 @@ mod check;
 mod cover;
 mod data;
 mod items;
+mod meshes;
 pub mod names;
 mod passes;
 mod range;
@@ -22,6 +23,7 @@ use crate::scene::{Camera, Scene};
 
 pub use data::{NODE_TEXELS, QUAD_INDEX_BYTES, tables};
 pub use items::Item;
+pub use meshes::{envelope_words, leaf_masks};
 pub use tiles::{Drawing, Rasterizer, TILE_STEPS, TileBuffer, TileBuffers};
 
 /// Storage buffers that every Vulkan device binds, when no device is known.
@@ -89,6 +91,10 @@ pub struct Plan {
     pub forest: bool,
     /// Whether trees are drawn one by one: any can come within the range of an eye. Without, the shader-map shows all.
     pub z_fields: bool,
+    /// Distance to which trees of each species are their models' meshes, m: 0 where none is.
+    pub mesh_range: Vec<f64>,
+    /// Whether any tree can come within that of an eye.
+    pub meshes: bool,
     /// Whether light meets the average light that the pair tables hold (BN12, G and T): that of a sun, and where it
     /// converges at any distance that there is.
     pub pair_tables: bool,
@@ -205,6 +211,8 @@ impl Plan {
             plan.pair_tables = plan.sun && ladder.averages();
             plan.z_fields =
                 std::iter::once(&eye.position).chain(places).any(|p| plan.scene_in_range(scene, *p));
+            plan.meshes = plan.z_fields
+                && std::iter::once(&eye.position).chain(places).any(|p| plan.scene_has_mesh_at(scene, *p));
             if plan.z_fields && plan.sun {
                 plan.transfer_bands = scene.settings.transfer_bands;
             }
@@ -236,6 +244,8 @@ impl Plan {
             sun: scene.sun.shines(),
             forest: false,
             z_fields: false,
+            mesh_range: Vec::new(),
+            meshes: false,
             pair_tables: false,
             transfer_bands: 0,
             cascades: if scene.sun.shines() { s.cascades } else { 0 },
@@ -264,6 +274,11 @@ impl Plan {
             cover_channels: 0,
             pattern: None,
         }
+    }
+
+    /// Whether the picture shows trees that are meshes.
+    pub fn shows_meshes(&self) -> bool {
+        self.meshes && self.shows_trees()
     }
 
     /// Whether the picture shows trees that are drawn one by one: in a view mode of the ground they would hide it.

@@ -22,6 +22,12 @@ pub mod pass {
     pub const SHADOWS: &str = "shadows";
     /// A sky that is an image.
     pub const SKY: &str = "sky";
+    /// Which of the trees in view are meshes.
+    pub const MESH_LISTS: &str = "mesh lists";
+    /// Meshes: which triangle each sample sees.
+    pub const MESHES: &str = "meshes";
+    /// Light on meshes.
+    pub const MESH_LIGHT: &str = "mesh light";
     /// Trees far away, and average light.
     pub const SHADER_MAP: &str = "shader-map";
     /// The ground.
@@ -74,6 +80,12 @@ pub mod pipeline {
     pub const HORIZON: &str = "horizon";
     /// Tiles: light on the ground.
     pub const GROUND: &str = "ground";
+    /// Which of the trees in view are meshes.
+    pub const MESH_LISTS: &str = "mesh lists";
+    /// Meshes: which triangle each sample sees.
+    pub const MESHES: &str = "meshes";
+    /// Light on meshes.
+    pub const MESH_LIGHT: &str = "mesh light";
     /// What of a tree's pipelines finds where the sun enters.
     pub const LIGHT_RAY: &str = "light ray of trees";
 }
@@ -100,6 +112,18 @@ pub mod resource {
     pub const PAIR_TABLES: &str = "pair tables";
     /// View tables of all species.
     pub const VIEW_TABLES: &str = "view tables";
+    /// Corners of the meshes' triangles.
+    pub const MESH_CORNERS: &str = "mesh corners";
+    /// What the meshes' triangles are.
+    pub const MESH_FACES: &str = "mesh faces";
+    /// Crowns around the leaves of meshes.
+    pub const ENVELOPES: &str = "leaf envelopes";
+    /// Where the meshes' materials are holes.
+    pub const LEAF_MASKS: &str = "leaf masks";
+    /// Draws of the meshes.
+    pub const MESH_DRAWS: &str = "mesh draws";
+    /// Trees in view that are meshes.
+    pub const MESH_TREES: &str = "mesh trees";
     /// Density maps.
     pub const DENSITY_MAPS: &str = "density maps";
     /// The point pattern.

@@ -17,6 +17,11 @@ const TREE_PIPELINES: [(&str, &str); 4] = [
 /// Why there is a pass of its own for the sky.
 const HORIZON: &str = "trees of the shader-map before the sky, where the ground ends";
 
+/// Why there are passes for meshes.
+const MESH_LISTS: &str = "which of the trees in view are near enough to be meshes, species by species";
+const MESHES: &str = "the triangle of a mesh that each sample sees";
+const MESH_LIGHT: &str = "light on leaves and bark, once a pixel and triangle that it sees";
+
 impl Plan {
     /// Whether trees of the shader-map are put before the sky where the ground ends: in tiles, and where none are drawn one by one
     /// there because the ground's silhouettes are looked for.
@@ -34,6 +39,11 @@ impl Plan {
                 add(pipeline::HORIZON, HORIZON);
             }
             add(pipeline::GROUND, "light on the ground, once a pixel that sees it");
+        }
+        if self.meshes {
+            add(pipeline::MESH_LISTS, MESH_LISTS);
+            add(pipeline::MESHES, MESHES);
+            add(pipeline::MESH_LIGHT, MESH_LIGHT);
         }
         if self.z_fields {
             let pipelines = if tiles { &tiles::TREE_PIPELINES[..] } else { &TREE_PIPELINES };
@@ -81,11 +91,18 @@ impl Plan {
         if self.horizon() {
             add(pass::HORIZON, HORIZON);
         }
+        if self.meshes {
+            add(pass::MESH_LISTS, MESH_LISTS);
+            add(pass::MESHES, MESHES);
+        }
         if self.z_fields && tiles {
             tiles::TREE_PASSES.iter().for_each(|(name, reason)| add(name, reason));
         }
         if tiles {
             add(pass::GROUND, "light on the ground, once a pixel that sees it");
+        }
+        if self.meshes {
+            add(pass::MESH_LIGHT, MESH_LIGHT);
         }
         if self.z_fields && tiles {
             add(pass::TREE_LIGHT, "light on trees, once a pixel and tree that it sees");

@@ -23,6 +23,7 @@ impl Plan {
             let height = species.mesh.positions.iter().map(|p| p[2]).fold(0.0, f32::max).max(1e-3);
             let range = self.ladder.range(s, f64::from(height) * eye.pixels_at_1m, farthest);
             self.species_range.push(range);
+            self.mesh_range.push(self.ladder.mesh_range(s, f64::from(height) * eye.pixels_at_1m));
             self.range = self.range.max(range);
         }
         if self.ladder.averages() {
@@ -83,9 +84,24 @@ impl Plan {
     /// Whether any tree on ground of this extent between two heights may be near enough to a place to be drawn by itself:
     /// whether the box of their centres reaches into the range, with room for the rounding of single precision.
     pub fn trees_in_range(&self, extent: [f64; 2], ground: [f64; 2], place: [f64; 3]) -> bool {
+        self.trees_within_of(self.last_range(), extent, ground, place)
+    }
+
+    /// Whether any tree on ground of this extent between two heights may be so near a place that it is its model's mesh.
+    pub fn mesh_in_range(&self, extent: [f64; 2], ground: [f64; 2], place: [f64; 3]) -> bool {
+        self.trees_within_of(self.last_mesh_range(), extent, ground, place)
+    }
+
+    /// Distance to which any tree is its model's mesh, m.
+    pub fn last_mesh_range(&self) -> f64 {
+        self.mesh_range.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Whether a tree of a range may be within it from a place.
+    fn trees_within_of(&self, range: f64, extent: [f64; 2], ground: [f64; 2], place: [f64; 3]) -> bool {
         let [low, high] = self.trees_box(extent, ground);
         let apart: f64 = (0..3).map(|k| (place[k] - place[k].clamp(low[k], high[k])).powi(2)).sum();
-        self.range > 0.0 && apart.sqrt() <= 1.001 * self.last_range() + 1.0
+        range > 0.0 && apart.sqrt() <= 1.001 * range + 1.0
     }
 
     /// Whether trees of a ladder that hands over to no average are all drawn, on ground of this extent between two heights, as seen
@@ -104,11 +120,21 @@ impl Plan {
     /// Whether any tree of a scene may be near enough to a place to be drawn by itself. The nearest ground, below most cameras, saves
     /// looking at all of it.
     pub(super) fn scene_in_range(&self, scene: &Scene, place: [f64; 3]) -> bool {
-        let terrain = &scene.terrain;
-        let [x, y] = [0, 1].map(|k| place[k].clamp(0.0, terrain.extent[k]));
-        self.trees_in_range(terrain.extent, [terrain.height_at(x, y); 2], place)
-            || terrain.heights.is_some() && self.trees_in_range(terrain.extent, ground_range(scene), place)
+        near_ground(scene, place, |extent, ground| self.trees_in_range(extent, ground, place))
     }
+
+    /// Whether any tree of a scene may be so near a place that it is its model's mesh.
+    pub(super) fn scene_has_mesh_at(&self, scene: &Scene, place: [f64; 3]) -> bool {
+        near_ground(scene, place, |extent, ground| self.mesh_in_range(extent, ground, place))
+    }
+}
+
+/// Whether something is so of the ground nearest to a place, or of all ground: its extent and two heights.
+fn near_ground(scene: &Scene, place: [f64; 3], is: impl Fn([f64; 2], [f64; 2]) -> bool) -> bool {
+    let terrain = &scene.terrain;
+    let [x, y] = [0, 1].map(|k| place[k].clamp(0.0, terrain.extent[k]));
+    is(terrain.extent, [terrain.height_at(x, y); 2])
+        || terrain.heights.is_some() && is(terrain.extent, ground_range(scene))
 }
 
 /// The farthest that a point of a box is from a place, m.

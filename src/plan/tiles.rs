@@ -227,14 +227,27 @@ impl Plan {
                 tree_components()
             )));
         }
+        if self.meshes && wanted == Some(Rasterizer::Graphics) {
+            return Err(Error::Usage(
+                "--rasterizer graphics: trees are meshes near this camera, and those are lit where tiles see them: use --rasterizer \
+                 tiles, or a ladder without mesh"
+                    .into(),
+            ));
+        }
         self.rasterizer = match (wanted, beyond) {
+            (None, Some(why)) if self.meshes => {
+                return Err(Error::Usage(format!(
+                    "trees are meshes near this camera, which takes tiles: {why} on this device: draw fewer trees or a smaller picture, \
+                     or use a ladder without mesh"
+                )));
+            }
             (Some(Rasterizer::Tiles), Some(why)) => {
                 return Err(Error::Usage(format!(
                     "--rasterizer tiles: {why} on this device: draw fewer trees or a smaller picture, or use --rasterizer graphics"
                 )));
             }
             (Some(rasterizer), _) => rasterizer,
-            (None, None) if cpu || narrow.is_some() => Rasterizer::Tiles,
+            (None, None) if cpu || narrow.is_some() || self.meshes => Rasterizer::Tiles,
             (None, _) => Rasterizer::Graphics,
         };
         Ok(())

@@ -68,11 +68,11 @@ void main() {
         light_c[i] = vec4(project(lb, c), light_layers[i]);
         light_d[i] = project(lb, l);
     }
-    mat4 shadow = v.cascade_from_world[min(t.cascade, MAX_CASCADES - 1u)];
+    mat4 shadow = v.cascade_from_world[min(cascade_of(t), MAX_CASCADES - 1u)];
     shadow_p = (shadow * vec4(position, 1.0)).xyz;
     shadow_c = vec4(shadow[3].xyz, (shadow * vec4(v.sun_direction, 0.0)).z);
     // A texel spans crowns whose backs slope by about one: half a texel towards the sun, or neighbours shade each other's rims.
-    float bias = 0.5 * v.cascade_texel[min(t.cascade, MAX_CASCADES - 1u)] * shadow_c.w;
+    float bias = 0.5 * v.cascade_texel[min(cascade_of(t), MAX_CASCADES - 1u)] * shadow_c.w;
     shadow_p.z += bias;
     shadow_c.z += bias;
     weights = vec4(t.view_weights, t.light_weights);
@@ -84,7 +84,7 @@ void main() {
     sun = vec4(t.sun, hole.x);
     sky = vec4(t.sky, plane.half_extent.z);
     uvec3 row = masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz;
-    tree_bits = uvec4(row, t.cascade | (below ? 16u : 0u) | t.species << 5u | caster_name(t.identity) << 8u | (t.mean_lit_change & 0xffff0000u));
+    tree_bits = uvec4(row, cascade_of(t) | (below ? 16u : 0u) | t.species << 5u | caster_name(t.identity) << 8u | (t.mean_lit_change & 0xffff0000u));
     bark_ratio = vec4(kind.bark_ratio, kind.bare_below);
     mean_sun = vec4(t.mean_sun, weight.x);
     mean_sky = vec4(t.mean_sky, lit.x);

@@ -1,6 +1,8 @@
-// Colours of z-field trees in the view modes. Needs frame/view_mode.glsl.
+// Colours of trees that are drawn one by one in the view modes. Needs frame/view_mode.glsl.
 
-// `draw` is which of the camera's draws the tree is in: magnified, with estimates, without, converged.
+// `draw` is which of the camera's draws the tree is in: magnified, with estimates, without, converged; or MESH_DRAW: it is a mesh.
+const uint MESH_DRAW = CAMERA_DRAWS;
+
 vec3 tree_mode(uint draw, uint cascade, float lit) {
     // Normals of the ellipsoid that stands for the crown are no better than none: trees are grey.
     vec3 shown = vec3(0.5);
@@ -11,6 +13,7 @@ vec3 tree_mode(uint draw, uint cascade, float lit) {
         if (draw == 1u) shown = vec3(0.95, 0.45, 0.05);
         if (draw == 0u) shown = vec3(0.9, 0.1, 0.1);
         if (draw == 3u) shown = vec3(0.1, 0.7, 0.2);
+        if (draw == MESH_DRAW) shown = vec3(0.8, 0.2, 0.8);
     }
     if (VIEW_MODE == MODE_CASCADES) shown = cascade_colour(cascade, cascade < MAX_CASCADES ? lit : 1.0);
     return shown;

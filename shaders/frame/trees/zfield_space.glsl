@@ -23,13 +23,22 @@ Tree fetch_tree(usamplerBuffer trees, uint index) {
     t.sun = uintBitsToFloat(a.xyz);
     t.hole_change = a.w;
     t.sky = uintBitsToFloat(b.xyz);
-    t.cascade = b.w;
+    t.cascade_tint = b.w;
     t.mean_sun = uintBitsToFloat(c.xyz);
     t.own_lit = c.w;
     t.mean_sky = uintBitsToFloat(d.xyz);
     t.mean_lit_change = d.w;
     return t;
 }
+
+// Its cascade for shadow lookups, MAX_CASCADES where it is beyond all.
+uint cascade_of(Tree t) { return t.cascade_tint & 0xffu; }
+
+// In how many of a pixel's samples it is its mesh.
+uint mesh_count(Tree t) { return t.cascade_tint >> 8u & 0xffu; }
+
+// Factor of its colours.
+float tint_of(Tree t) { return unpackHalf2x16(t.cascade_tint).y; }
 
 // A view's projection, of four texels.
 ViewBasis fetch_basis(samplerBuffer bases, uint view) {

@@ -214,6 +214,17 @@ impl RenderPass<'_, '_> {
         unsafe { r.device().cmd_draw(r.cmd, vertices, instances, 0, 0) };
     }
 
+    /// Draws without an index buffer; the arguments are the command at byte `offset` of `commands`.
+    pub fn draw_indirect(&mut self, commands: &Buffer, offset: u64) {
+        if self.work.program.is_none() {
+            return;
+        }
+        let r = &mut *self.work.recorder;
+        r.draws += 1;
+        // SAFETY: a program and its resources are bound; the buffer is alive and holds what the shader that wrote it put there.
+        unsafe { r.device().cmd_draw_indirect(r.cmd, commands.handle, offset, 1, 16) };
+    }
+
     /// Draws with 32-bit indices; the arguments are the command at byte `offset` of `commands`.
     pub fn draw_indexed_indirect(&mut self, indices: &Buffer, commands: &Buffer, offset: u64) {
         if self.work.program.is_none() {

@@ -137,7 +137,7 @@ uint sees(Sight s, vec2 pixel, out float depth) {
         bool inside = c.x >= s.extent.x && c.x <= s.extent.y && c.y >= s.extent.z && c.y <= s.extent.w;
         within |= inside ? 1u << k : 0u;
     }
-    return mask & within;
+    return mask & within & ~mesh_mask(s.mesh, uint(s.dither * 1024.0), SAMPLES);
 }
 
 // A pixel's way through its trees.

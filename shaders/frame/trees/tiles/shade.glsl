@@ -16,7 +16,6 @@
 #include "frame/view_mode.glsl"
 #include "frame/trees/zfield_mode.glsl"
 #include "frame/shown.glsl"
-#include "frame/column_items.glsl"
 #include "frame/tile.glsl"
 
 layout(local_size_x = 8) in;
@@ -36,8 +35,6 @@ layout(constant_id = 1) const uint ESTIMATES = 1u;
 layout(constant_id = 2) const int LIGHT_ITERATIONS = 1;
 layout(constant_id = 3) const bool HAS_SUN = true;
 layout(constant_id = 4) const uint TRANSFER_BANDS = 0u;
-
-const uint MOST_ITEMS = TILE_SIDE * 8u; // trees of a column: one a sample, of up to eight
 
 // What a tree shows to a pixel that sees it, and how deep; `offset` is the pixel's from the image's centre.
 Shown shade(uint rank, vec2 offset, out float depth) {
@@ -78,7 +75,7 @@ Shown shade(uint rank, vec2 offset, out float depth) {
     }
     ray.layers = light_layers;
     ray.weights = vec3(t.light_weights, 1.0 - t.light_weights.x - t.light_weights.y);
-    uint cascade = min(t.cascade, MAX_CASCADES - 1u);
+    uint cascade = min(cascade_of(t), MAX_CASCADES - 1u);
     mat4 shadow = v.cascade_from_world[0];
     ray.turn = v.cascade_turn[0].xy;
     for (uint k = 1u; k < MAX_CASCADES; k++) {
@@ -93,13 +90,13 @@ Shown shade(uint rank, vec2 offset, out float depth) {
     vec2 hole = unpackHalf2x16(t.hole_change), own = unpackHalf2x16(t.own_lit), lit = unpackHalf2x16(t.mean_lit_change);
     TreeLight light = TreeLight(t.sun, hole.y, t.sky, t.mean_sun, t.mean_sky, lit.x, own.x, vec2(own.y, lit.y), kind.bark_ratio,
                                 kind.bare_below, plane.half_extent.z, hole.x, kind.leaf_shadow * root, kind.extinction * phase_angle / t.scale, toward,
-                                transfer_strength(root), t.cascade, caster_name(t.identity));
+                                transfer_strength(root), cascade_of(t), caster_name(t.identity));
     TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, light, surface, at, to, layers, below, t.mip, magnified,
                                  s, found.z, ray, LightQuality(HAS_SUN, LIGHT_ITERATIONS, TRANSFER_BANDS));
 #ifdef LAYERS
     return Shown(vec4(parts.sun, 1.0), vec4(parts.sky, 1.0), vec4(0.0, 0.0, parts.lit, 1.0 - parts.lit));
 #else
-    if (VIEW_MODE != 0u) return Shown(vec4(tree_mode(draw == 1u && ESTIMATES == 0u ? 2u : draw, t.cascade, parts.lit), 1.0));
+    if (VIEW_MODE != 0u) return Shown(vec4(tree_mode(draw == 1u && ESTIMATES == 0u ? 2u : draw, cascade_of(t), parts.lit), 1.0));
     return Shown(vec4(parts.sun + parts.sky, 1.0));
 #endif
 }
@@ -110,39 +107,9 @@ uint species_of(uint rank) {
     return texelFetch(trees, int(tree) * 8 + 1).z;
 }
 
-shared uint ranks[8u * MOST_ITEMS];  // the trees of each column
-shared uint places[8u * MOST_ITEMS]; // samples that see them; row of the pixel << 8
+uint sample_sees(ivec2 pixel, int k) { return texelFetch(seen, int((pixel.y * int(p.size.x) + pixel.x) * int(SAMPLES)) + k).x; }
 
-// Lists the trees of this invocation's column.
-void list_items(uvec2 corner, uint column) {
-    uint count = 0u, first_item = column * MOST_ITEMS;
-    for (uint row = 0u; row < TILE_SIDE; row++) {
-        uvec2 pixel = corner + uvec2(column, row);
-        bool inside = pixel.x < p.size.x && pixel.y < p.size.y;
-        int at = int((min(pixel.y, p.size.y - 1u) * p.size.x + min(pixel.x, p.size.x - 1u)) * SAMPLES);
-        uint tree[8];
-        for (uint k = 0u; k < SAMPLES; k++) tree[k] = inside ? texelFetch(seen, at + int(k)).x : 0u;
-        for (uint k = 0u; k < SAMPLES; k++) {
-            bool first = tree[k] != 0u;
-            uint samples = 0u;
-            for (uint i = 0u; i < SAMPLES; i++) {
-                first = first && (i >= k || tree[i] != tree[k]);
-                samples |= tree[i] == tree[k] ? 1u << i : 0u;
-            }
-            if (first) {
-                ranks[first_item + count] = tree[k] - 1u;
-                places[first_item + count] = samples | row << 8u;
-                count++;
-            }
-        }
-    }
-    counts[column] = count;
-}
-
-// The pixel of an item, from the image's centre.
-vec2 item_offset(uvec2 corner, uint slot) {
-    return vec2(corner + uvec2(slot / MOST_ITEMS, places[slot] >> 8u)) + 0.5 - 0.5 * vec2(p.size);
-}
+#include "frame/trees/distinct.glsl"
 
 shared Shown shown[8u * MOST_ITEMS];
 #ifdef LAYERS
@@ -158,7 +125,9 @@ void main() {
     for (uint i = column; i < total; i += 8u) {
         uint slot = item_slot(i, MOST_ITEMS);
         float depth;
-        shown[slot] = shade(ranks[slot], item_offset(corner, slot), depth);
+        // From the image's centre.
+        vec2 offset = vec2(item_pixel(corner, slot)) + 0.5 - 0.5 * vec2(p.size);
+        shown[slot] = shade(ranks[slot] - 1u, offset, depth);
 #ifdef LAYERS
         depths[slot] = depth;
 #endif
@@ -180,7 +149,7 @@ void main() {
         if (covered != 0u && covered + 1u != 1u << SAMPLES) all = sum(all, load_pixel(pixel));
         if (covered != 0u) store_pixel(pixel, all);
 #ifdef LAYERS
-        if (first != ~0u) store_first(pixel, species_of(ranks[first]) + 1u, depths[first]);
+        if (first != ~0u) store_first(pixel, species_of(ranks[first] - 1u) + 1u, depths[first]);
 #endif
     }
 }

@@ -79,7 +79,8 @@ void main() {
     s.across = vec4(0.0);
     s.start = at;
     s.depth = deepest;
-    if (deepest > 0.0 && t.fade > 0.0) {
+    s.mesh = mesh_count(t);
+    if (deepest > 0.0 && t.fade > 0.0 && s.mesh < SAMPLES) {
         vec3 point = t.centre + (at == vec2(0.0) ? vec3(0.0) : world_from_tree(t, kind, plane.right * at.x + plane.up * at.y) - t.centre);
         vec3 ray = point / deepest;
         s.pixel = vec2(dot(ray, camera.x), dot(ray, camera.y)) + 0.5 * vec2(p.size);

@@ -23,6 +23,7 @@ struct Sight {
     uint draw;       // which of the camera's draws it belongs to: magnified, with estimates, without, converged
     uint bin;        // of depth
     float fade;      // factor of the opacity
+    uint mesh;       // samples in which it is its mesh
     vec3 right[3];   // in the views
     vec3 up[3];
     vec3 toward[3];
@@ -37,7 +38,7 @@ uvec4 sight_words(Sight s, uint k) {
     if (k == 2u) return uvec4(packHalf2x16(s.extent.xy), packHalf2x16(s.extent.zw), packHalf2x16(s.start), floatBitsToUint(s.depth));
     if (k == 3u) {
         uint kind = s.first | s.mip << 16u | s.draw << 20u | uint(s.dither * 1024.0) << 22u;
-        return uvec4(packHalf2x16(s.weights), s.layers, kind, packHalf2x16(vec2(s.fade, 0.0)) | s.bin << 16u);
+        return uvec4(packHalf2x16(s.weights), s.layers, kind, packHalf2x16(vec2(s.fade, 0.0)) | s.bin << 16u | s.mesh << 26u);
     }
     if (k < 7u) {
         vec3 r = s.right[k - 4u], u = s.up[k - 4u], w = s.toward[k - 4u];
@@ -47,7 +48,7 @@ uvec4 sight_words(Sight s, uint k) {
 }
 
 // Its bin of depth alone.
-uint sight_bin(usamplerBuffer records, uint tree) { return texelFetch(records, int(tree * SIGHT_TEXELS) + 3).w >> 16u; }
+uint sight_bin(usamplerBuffer records, uint tree) { return texelFetch(records, int(tree * SIGHT_TEXELS) + 3).w >> 16u & 0x3ffu; }
 
 Sight unpack_sight(usamplerBuffer records, uint tree) {
     int at = int(tree * SIGHT_TEXELS);
@@ -68,7 +69,8 @@ Sight unpack_sight(usamplerBuffer records, uint tree) {
     s.draw = w.z >> 20u & 3u;
     s.dither = (float(w.z >> 22u) + 0.5) * (1.0 / 1024.0);
     s.fade = unpackHalf2x16(w.w).x;
-    s.bin = w.w >> 16u;
+    s.bin = w.w >> 16u & 0x3ffu;
+    s.mesh = w.w >> 26u;
     for (int k = 0; k < 3; k++) {
         w = texelFetch(records, at + 4 + k);
         vec2 z = unpackHalf2x16(w.z);

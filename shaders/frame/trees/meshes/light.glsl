@@ -1,0 +1,179 @@
+// Light on meshes where samples see them, once a pixel and triangle (BBP08, section 4). One workgroup a tile of 8 x 8 pixels, as for
+// z-fields: every invocation lists what its column of pixels sees; all light the list in turn; each puts its pixels together.
+#include "physics/hash.glsl"
+#include "physics/light.glsl"
+#include "physics/shadow.glsl"
+#include "physics/leaf.glsl"
+#include "frame/trees/zfield_space.glsl"
+#include "frame/trees/meshes/seen.glsl"
+#include "frame/trees/meshes/corner.glsl"
+#include "frame/camera.glsl"
+#include "frame/samples.glsl"
+#include "frame/view_mode.glsl"
+#include "frame/trees/zfield_mode.glsl"
+#include "frame/shown.glsl"
+#include "frame/tile.glsl"
+
+layout(local_size_x = 8) in;
+layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
+layout(binding = 1) uniform usamplerBuffer trees;
+layout(std140, binding = 2) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
+layout(std430, binding = 3) readonly buffer Draws { MeshDraw items[]; } draws;
+layout(std430, binding = 4) readonly buffer MeshTrees { uint items[]; } mesh_trees;
+layout(binding = 5) uniform usamplerBuffer corners;
+layout(binding = 6) uniform usamplerBuffer faces;
+layout(binding = 7) uniform usamplerBuffer seen;      // z-field trees, which are before what meshes show
+layout(binding = 8) uniform usamplerBuffer envelopes;
+layout(std140, binding = 9) uniform Leaves { vec4 items[2u * 26u]; } rule;
+layout(std140, binding = 12) uniform Optics { vec4 items[3u * MAX_SPECIES]; } optics; // of each species: reflectance and transmittance of leaves, bark
+layout(binding = 13) uniform sampler2DArray shadow_map;
+#ifdef SINGLE
+layout(binding = 10) uniform sampler2DArray depth;
+layout(binding = 11) uniform usampler2DArray quads_seen;
+#else
+layout(binding = 10) uniform sampler2DMSArray depth;
+layout(binding = 11) uniform usampler2DMSArray quads_seen;
+#endif
+layout(push_constant) uniform Push { TileParameters p; };
+layout(constant_id = 0) const uint SAMPLES = 4u;
+layout(constant_id = 1) const bool HAS_SUN = true;
+layout(constant_id = 2) const uint LEAF_DIRECTIONS = 26u;
+layout(constant_id = 3) const int LEAF_POWER = 6;
+
+// What the crown leaves of sky and sun at a triangle of unit normal n; all in the tree's own axes.
+LeafLight leaf_light(uint face, vec3 n, vec3 sun) {
+    const uint words = (LEAF_DIRECTIONS + 7u) / 8u;
+    LeafLight light = LeafLight(vec2(0.0), 0.0);
+    vec2 sides = vec2(0.0);
+    float towards = 0.0;
+    for (uint word = 0u; word < words; word++) {
+        uvec4 w = texelFetch(envelopes, int(face * words + word));
+        for (uint k = 0u; k < 8u && 8u * word + k < LEAF_DIRECTIONS; k++) {
+            uint pair = k < 2u ? w.x : k < 4u ? w.y : k < 6u ? w.z : w.w, at = 2u * (8u * word + k);
+            vec2 both = unpackHalf2x16(pair);
+            leaf_direction(light, sides, towards, rule.items[at], rule.items[at + 1u].x, (k & 1u) == 0u ? both.x : both.y, n, sun,
+                           LEAF_POWER);
+        }
+    }
+    light.sky /= max(sides, 1e-6);
+    light.sun /= max(towards, 1e-6);
+    return light;
+}
+
+// What shadow maps leave of the sun at a place, that of its own tree left out.
+float others_leave(Tree t, Species kind, vec3 world) {
+    View v = view.v;
+    uint cascade = min(cascade_of(t), MAX_CASCADES - 1u);
+    mat4 shadow = v.cascade_from_world[0];
+    vec2 turn = v.cascade_turn[0].xy;
+    for (uint k = 1u; k < MAX_CASCADES; k++) {
+        if (k == cascade) shadow = v.cascade_from_world[k];
+        if (k == cascade) turn = v.cascade_turn[k].xy;
+    }
+    vec3 at = (shadow * vec4(world, 1.0)).xyz;
+    float deeper = (shadow * vec4(v.sun_direction, 0.0)).z;
+    at.z += 0.5 * v.cascade_texel[cascade] * deeper;
+    float reach = 4.0 * kind.scale_to_metres.z * t.scale * deeper;
+    float visible = sun_visibility(shadow_map, at, vec2(0.0), turn, cascade, caster_name(t.identity), reach);
+    return cascade_of(t) < MAX_CASCADES ? visible : 1.0;
+}
+
+// What a triangle shows to a pixel, at a place of the world from the camera.
+Shown shade(uint what, vec3 world) {
+    View v = view.v;
+    Tree t = fetch_tree(trees, mesh_trees.items[seen_tree(what)]);
+    Species kind = species.items[t.species];
+    uint face = draws.items[t.species].first_face + seen_triangle(what);
+    mat3 back = tree_rotation(t);
+    vec3 a = corner_place(texelFetch(corners, int(3u * face))), viewer = back * normalize(-world), sun = back * v.sun_direction;
+    vec3 n = normalize(cross(corner_place(texelFetch(corners, int(3u * face + 1u))) - a, corner_place(texelFetch(corners, int(3u * face + 2u))) - a));
+    bool leaf = texelFetch(faces, int(face)).y != 0u;
+    // Bark has one side, that which is seen.
+    if (!leaf && dot(n, viewer) < 0.0) n = -n;
+    vec3 reflectance = optics.items[3u * t.species + (leaf ? 0u : 2u)].rgb, transmittance = leaf ? optics.items[3u * t.species + 1u].rgb : vec3(0.0);
+    LeafLight light = leaf_light(face, n, sun);
+    // What slope and neighbours leave of the sky, times its radiance and the tint: the same as for the tree's z-field.
+    vec2 hole = unpackHalf2x16(t.hole_change), own = unpackHalf2x16(t.own_lit), lit = unpackHalf2x16(t.mean_lit_change);
+    float height = (back * (world - t.centre)).z / (kind.scale_to_metres.z * t.scale);
+    vec3 sky = t.sky / max(0.5 * kind.albedo, 1e-6) * hole_occlusion(max(1.0 - height, 0.0) * kind.scale_to_metres.z * t.scale, hole.x);
+    vec3 sky_part = own.x * leaf_sky(reflectance, transmittance, n, viewer, light.sky) * sky + t.mean_sky;
+    vec3 sun_part = t.mean_sun;
+    float lit_part = 0.0;
+    if (HAS_SUN) {
+        float visible = light.sun * others_leave(t, kind, world);
+        lit_part = own.x * visible + lit.x;
+        sun_part += (own.x * visible * tint_of(t)) * leaf_sun(reflectance, transmittance, n, viewer, sun) * v.sun_irradiance;
+    }
+#ifdef LAYERS
+    return Shown(vec4(sun_part, 1.0), vec4(sky_part, 1.0), vec4(0.0, 0.0, lit_part, 1.0 - lit_part));
+#else
+    if (VIEW_MODE != 0u) return Shown(vec4(tree_mode(MESH_DRAW, cascade_of(t), lit_part), 1.0));
+    return Shown(vec4(sun_part + sky_part, 1.0));
+#endif
+}
+
+uint sample_sees(ivec2 pixel, int k) {
+    uint tree = texelFetch(seen, int((pixel.y * int(p.size.x) + pixel.x) * int(SAMPLES)) + k).x;
+    uint what = texelFetch(quads_seen, ivec3(pixel, 0), k).r;
+    return tree == 0u && is_mesh(what) ? what : 0u;
+}
+
+// Whether a sample of a pixel sees the ground or the sky, so that something is there already.
+bool sees_past(ivec2 pixel) {
+    bool past = false;
+    for (uint k = 0u; k < SAMPLES; k++) {
+        uint tree = texelFetch(seen, int((pixel.y * int(p.size.x) + pixel.x) * int(SAMPLES) + int(k))).x;
+        past = past || (tree == 0u && !is_mesh(texelFetch(quads_seen, ivec3(pixel, 0), int(k)).r));
+    }
+    return past;
+}
+
+#include "frame/trees/distinct.glsl"
+
+// The mean place of samples of a pixel.
+vec3 place_of(ivec2 pixel, uint samples) {
+    Camera camera = camera_of(view.v, vec2(p.size));
+    vec3 sum = vec3(0.0);
+    for (uint k = 0u; k < SAMPLES; k++) {
+        vec2 offset = vec2(pixel) + 0.5 + sample_offset(k, SAMPLES) - 0.5 * vec2(p.size);
+        float deep = view.v.clip_from_world[3].z / max(texelFetch(depth, ivec3(pixel, 0), int(k)).r, 1e-30);
+        sum += (samples >> k & 1u) != 0u ? deep * (camera.forward + offset.x * camera.right + offset.y * camera.down) : vec3(0.0);
+    }
+    return sum / float(bitCount(samples));
+}
+
+shared Shown shown[8u * MOST_ITEMS];
+
+void main() {
+    uvec2 corner = tile_corner();
+    uint column = gl_LocalInvocationIndex;
+    list_items(corner, column);
+    barrier();
+    uint total = item_count();
+    for (uint i = column; i < total; i += 8u) {
+        uint slot = item_slot(i, MOST_ITEMS);
+        shown[slot] = shade(ranks[slot], place_of(item_pixel(corner, slot), places[slot] & 0xffu));
+    }
+    barrier();
+    uint item = column * MOST_ITEMS, end = item + counts[column];
+    for (uint row = 0u; row < TILE_SIDE; row++) {
+        Shown all = shown_nothing();
+        uint covered = 0u, first = ~0u;
+        while (item < end && places[item] >> 8u == row) {
+            uint samples = places[item] & 0xffu;
+            all = sum(all, scaled(shown[item], float(bitCount(samples)) / float(SAMPLES)));
+            first = (samples & 1u) != 0u ? item : first;
+            covered |= samples;
+            item++;
+        }
+        ivec2 pixel = ivec2(corner + uvec2(column, row));
+        if (covered != 0u && sees_past(pixel)) all = sum(all, load_pixel(pixel));
+        if (covered != 0u) store_pixel(pixel, all);
+#ifdef LAYERS
+        if (first != ~0u) {
+            uint kind = texelFetch(trees, int(mesh_trees.items[seen_tree(ranks[first])]) * 8 + 1).z;
+            store_first(pixel, kind + 1u, texelFetch(depth, ivec3(pixel, 0), 0).r);
+        }
+#endif
+    }
+}

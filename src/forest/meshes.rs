@@ -1,0 +1,195 @@
+//! Models of the species as meshes on the GPU: corners, faces, the crowns around leaves, holes, and what their surfaces reflect.
+
+use glam::Vec2;
+use half::f16;
+
+use crate::bake::envelope::Envelopes;
+use crate::bake::surface::{Face, Mask, Surface};
+use crate::bake::{Baked, SpeciesBake};
+use crate::gpu::interface::{MAX_SPECIES, MESH_TRIANGLES, MeshDraw, MeshFace, NO_PAGE};
+use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
+use crate::physics::leaf::Directions;
+use crate::plan::names::resource;
+use crate::plan::{Plan, envelope_words};
+use crate::scene::{Scene, Species};
+use crate::{Error, Result};
+
+/// Steps of texture coordinates along a texture; as `UV_STEPS` in `shaders/frame/trees/meshes/corner.glsl`.
+const UV_STEPS: f32 = 2048.0;
+/// Most directions of an envelope.
+const MOST_DIRECTIONS: usize = 26;
+
+/// What meshes are drawn from.
+pub struct MeshData {
+    /// Corners of all triangles, species after species.
+    pub corners: Buffer,
+    /// [`MeshFace`]s of all triangles.
+    pub faces: Buffer,
+    /// Optical thickness of the crown around each triangle.
+    pub envelopes: Buffer,
+    /// Where materials are holes, one a layer.
+    pub masks: Image,
+    /// [`MeshDraw`]s of the species; how many trees each draws is each frame's.
+    pub draws: Buffer,
+    /// Indices of the trees in view that are meshes, species after species.
+    pub trees: Buffer,
+    /// Directions of envelopes with their weights, and what of their cells is sky.
+    pub rule: Buffer,
+    /// Reflectance and transmittance of leaves, and reflectance of bark, of each species.
+    pub optics: Buffer,
+    /// Number of species.
+    pub species: u32,
+    /// Power of the lobe by which directions count for those between them.
+    pub power: u32,
+}
+
+/// What all meshes put together hold.
+#[derive(Default)]
+struct Content {
+    corners: Vec<[u32; 4]>,
+    faces: Vec<MeshFace>,
+    envelopes: Vec<f16>,
+    draws: Vec<MeshDraw>,
+    masks: Vec<Mask>,
+}
+
+impl MeshData {
+    /// Uploads the models of a plan with meshes.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for bakes without envelopes, and for models of more triangles than a sample's word can name;
+    /// [`Error::Device`] when out of memory.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, baked: &[Baked]) -> Result<Self> {
+        let rule = Directions::new(scene.settings.leaf_directions as usize)
+            .ok_or_else(|| Error::Usage("leaf_directions is 8, 14 or 26".into()))?;
+        let mut all = Content::default();
+        for (species, bake) in scene.species.iter().zip(baked) {
+            let envelopes =
+                bake.envelopes.as_ref().filter(|e| e.directions == rule.len()).ok_or_else(|| {
+                    Error::Usage(
+                        "a species was baked without the crown around its leaves that the plan lists".into(),
+                    )
+                })?;
+            all.add(species, envelopes)?;
+        }
+        let texels = |name, bytes: &[u8]| -> Result<Buffer> {
+            // Faces that are nowhere to be seen are in the plan, and not here.
+            let described = plan.buffer(name);
+            let mut content = bytes.to_vec();
+            content.resize(described.bytes as usize, 0);
+            gpu.described_buffer_with(&described, &content)
+        };
+        Ok(MeshData {
+            corners: texels(resource::MESH_CORNERS, bytemuck::cast_slice(&all.corners))?,
+            faces: texels(resource::MESH_FACES, bytemuck::cast_slice(&all.faces))?,
+            envelopes: texels(resource::ENVELOPES, bytemuck::cast_slice(&bits(&all.envelopes)))?,
+            masks: masks(gpu, plan, &all.masks)?,
+            draws: gpu.described_buffer_with(&plan.buffer(resource::MESH_DRAWS), &all.draws)?,
+            trees: gpu.described_buffer(&plan.buffer(resource::MESH_TREES))?,
+            rule: gpu.buffer_with("leaf directions", &rule_block(&rule))?,
+            optics: gpu.buffer_with("leaf optics", &optics_block(baked))?,
+            species: all.draws.len() as u32,
+            power: rule.power as u32,
+        })
+    }
+}
+
+impl Content {
+    fn add(&mut self, species: &Species, envelopes: &Envelopes) -> Result<()> {
+        let mesh = &species.mesh;
+        let surface = Surface::new(mesh)?;
+        if surface.faces.len() > MESH_TRIANGLES as usize {
+            return Err(Error::Usage(format!(
+                "species \"{}\" has {} triangles, and meshes of up to {MESH_TRIANGLES} are drawn: simplify the model, or use a ladder \
+                 without mesh",
+                species.name,
+                surface.faces.len()
+            )));
+        }
+        let any = mesh.materials.iter().any(|m| m.foliage);
+        let first_face = self.faces.len() as u32;
+        let first_mask = self.masks.len() as u32;
+        let words = 8 * envelope_words(envelopes.directions as u32) as usize;
+        for (k, face) in (0u32..).zip(&surface.faces) {
+            self.corners.extend(corners(&surface, face));
+            self.faces.push(MeshFace {
+                mask: face.mask.map_or(NO_PAGE, |m| first_mask + m),
+                foliage: u32::from(!any || mesh.materials[face.material as usize].foliage),
+                spare: [0; 2],
+            });
+            let around = envelopes.of(k).iter().map(|t| f16::from_f64(*t));
+            self.envelopes.extend(around.chain(std::iter::repeat(f16::ZERO)).take(words));
+        }
+        self.masks.extend(surface.masks);
+        self.draws.push(MeshDraw {
+            first_vertex: 3 * first_face,
+            first_face,
+            face_count: self.faces.len() as u32 - first_face,
+            ..bytemuck::Zeroable::zeroed()
+        });
+        Ok(())
+    }
+}
+
+/// A face's corners: places from the middle of the tree's box, m, and texture coordinates.
+fn corners(surface: &Surface, face: &Face) -> [[u32; 4]; 3] {
+    std::array::from_fn(|k| {
+        let [x, y, z] = (face.p[k] * surface.frame.scale()).to_array().map(f32::to_bits);
+        // They are small: what has more textures along a triangle than there is room for stays within.
+        let [u, v] = (face.uv[k] * UV_STEPS).to_array().map(|c| c.round().clamp(0.0, 65535.0) as u32);
+        [x, y, z, u | v << 16]
+    })
+}
+
+fn bits(halves: &[f16]) -> Vec<u16> {
+    halves.iter().map(|h| h.to_bits()).collect()
+}
+
+/// Directions as the shader takes them: each with its weight, and what of its cell of the sphere is sky.
+fn rule_block(rule: &Directions) -> Vec<[f32; 4]> {
+    let sky = rule.means(|w| f64::from(u8::from(w[2] > 0.0)));
+    let mut block = Vec::new();
+    for ((to, weight), sky) in rule.to.iter().zip(&rule.weights).zip(sky) {
+        block.push([to[0], to[1], to[2], *weight].map(|x| x as f32));
+        block.push([sky as f32, 0.0, 0.0, 0.0]);
+    }
+    block.resize(2 * MOST_DIRECTIONS, [0.0; 4]);
+    block
+}
+
+fn optics_block(baked: &[Baked]) -> Vec<[f32; 4]> {
+    let of = |s: &SpeciesBake| {
+        [s.reflectance, s.transmittance, s.bark_reflectance].map(|[r, g, b]| [r, g, b, 0.0])
+    };
+    let mut block: Vec<[f32; 4]> = baked.iter().flat_map(|b| of(&b.species)).collect();
+    block.resize(3 * MAX_SPECIES as usize, [0.0; 4]);
+    block
+}
+
+/// Uploads masks as layers of one array. Of the finest level texels are opacities, of which a half is the cutoff; of the others, shares of the
+/// finest that is no hole, so that a mask keeps its area however far it is.
+fn masks(gpu: &Gpu, plan: &Plan, masks: &[Mask]) -> Result<Image> {
+    let none = ImageDesc::stand_in(resource::LEAF_MASKS, vk::Format::R8_UNORM);
+    let image = gpu.image(plan.images(resource::LEAF_MASKS).next().unwrap_or(&none))?;
+    let side = image.size()[0];
+    for (layer, mask) in masks.iter().enumerate() {
+        let place = |k: u32| Vec2::new((k % side) as f32 + 0.5, (k / side) as f32 + 0.5) / side as f32;
+        let finest: Vec<u8> = (0..side * side).map(|k| mask.opacity(place(k))).collect();
+        gpu.upload_image(&image, 0, layer as u32, 1, &finest)?;
+        let mut shares: Vec<f32> =
+            (0..side * side).map(|k| f32::from(u8::from(mask.opaque(place(k))))).collect();
+        let mut width = side;
+        for level in 1..image.levels() {
+            width /= 2;
+            let mean = |k: u32| {
+                let at = (2 * (k / width) * 2 * width + 2 * (k % width)) as usize;
+                let below = at + 2 * width as usize;
+                0.25 * (shares[at] + shares[at + 1] + shares[below] + shares[below + 1])
+            };
+            shares = (0..width * width).map(mean).collect();
+            let bytes: Vec<u8> = shares.iter().map(|s| (s * 255.0).round() as u8).collect();
+            gpu.upload_image(&image, level, layer as u32, 1, &bytes)?;
+        }
+    }
+    Ok(image)
+}

@@ -1,0 +1,157 @@
+//! Trees that are their models' meshes (BBP08): which they are, which triangle each sample sees, and the light on that.
+
+use crate::forest::cull::CullData;
+use crate::forest::meshes::MeshData;
+use crate::frame::Forest;
+use crate::frame::targets::ImageTargets;
+use crate::gpu::interface::{MESH_TREES, MeshDraw, MeshParameters, TILE_SIDE, TileParameters};
+use crate::gpu::{
+    Buffer, DepthTest, Gpu, GraphicsDesc, Image, Later, Layers, Program, Recorder, Resource, Sampler,
+    Targets, shaders, vk,
+};
+use crate::plan::Plan;
+use crate::plan::names::pass;
+use crate::scene::Scene;
+use crate::{Error, Result};
+
+/// Finds, draws and lights meshes.
+pub struct Meshes {
+    list: Program,
+    draw: Program,
+    light: Program,
+    tiles: [u32; 2],
+    parameters: TileParameters,
+}
+
+impl Meshes {
+    /// Makes the programs.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if the device fails.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, data: &MeshData) -> Result<Self> {
+        let light = match (plan.layers, plan.samples > 1) {
+            (false, true) => &shaders::FRAME_TREES_MESHES_LIGHT_COMP,
+            (false, false) => &shaders::FRAME_TREES_MESHES_LIGHT_SINGLE_COMP,
+            (true, true) => &shaders::FRAME_TREES_MESHES_LIGHT_LAYERS_COMP,
+            (true, false) => &shaders::FRAME_TREES_MESHES_LIGHT_LAYERS_SINGLE_COMP,
+        };
+        Ok(Meshes {
+            list: gpu.compute(&shaders::FRAME_TREES_MESHES_LIST_COMP, &[])?,
+            draw: gpu.graphics(&GraphicsDesc {
+                vert: &shaders::FRAME_TREES_MESHES_MESH_VERT,
+                frag: &shaders::FRAME_TREES_MESHES_MESH_FRAG,
+                colors: &[vk::Format::R32_UINT],
+                samples: plan.samples,
+                depth: DepthTest::Reverse,
+                constants: &[("SAMPLES", plan.samples)],
+            })?,
+            light: gpu.compute(
+                light,
+                &[
+                    ("SAMPLES", plan.samples),
+                    ("HAS_SUN", u32::from(plan.sun)),
+                    ("LEAF_DIRECTIONS", scene.settings.leaf_directions),
+                    ("LEAF_POWER", data.power),
+                    ("VIEW_MODE", plan.view_mode as u32),
+                ],
+            )?,
+            tiles: plan.size.map(|n| n.div_ceil(TILE_SIDE)),
+            parameters: TileParameters { size: plan.size, ..bytemuck::Zeroable::zeroed() },
+        })
+    }
+
+    /// Records which of the trees in view, up to a distance in metres, are meshes, and which triangle of them each sample sees.
+    pub fn see(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        (cull, data, range): (&CullData, &MeshData, f64),
+        targets: &ImageTargets,
+    ) {
+        let all = [
+            ("view", Resource::Buffer(view)),
+            ("trees", Resource::Texels(&cull.trees)),
+            ("lists", Resource::Buffer(&cull.lists)),
+            ("starts", Resource::Buffer(&cull.starts)),
+            ("totals", Resource::Buffer(&cull.totals)),
+            ("draws", Resource::Buffer(&data.draws)),
+            ("mesh_trees", Resource::Buffer(&data.trees)),
+            ("corners", Resource::Texels(&data.corners)),
+            ("faces", Resource::Texels(&data.faces)),
+            ("masks", Resource::Texture(&data.masks, Sampler::LinearRepeat)),
+        ];
+        recorder.compute(pass::MESH_LISTS, |pass| {
+            pass.bind(&self.list, &all);
+            pass.push(&MeshParameters { bins: cull.bins_within(range), species_count: data.species });
+            pass.dispatch([1, 1, 1]);
+        });
+        let colors: Vec<_> = targets.quads.iter().map(|q| q.attachment(None, false)).collect();
+        let depth = Some(targets.depth.attachment(None, false));
+        recorder.render(pass::MESHES, &Targets { colors: &colors, depth, layers: Layers::One(0) }, |pass| {
+            pass.bind(&self.draw, &all);
+            for species in 0..data.species {
+                pass.push(&species);
+                pass.draw_indirect(&data.draws, u64::from(species) * size_of::<MeshDraw>() as u64);
+            }
+        });
+    }
+
+    /// Records the pass that lights what samples see of them where they see no z-field of `seen`, beside what else their pixels show.
+    #[allow(clippy::too_many_arguments)]
+    pub fn light(
+        &self,
+        recorder: &mut Recorder,
+        view: &Buffer,
+        forest: &Forest,
+        (cull, data): (&CullData, &MeshData),
+        shadow_map: &Image,
+        seen: &Buffer,
+        targets: &ImageTargets,
+    ) {
+        let Some(quads_seen) = &targets.quads else { return };
+        recorder.compute(pass::MESH_LIGHT, |pass| {
+            let shown = targets.shown();
+            let all = [
+                ("view", Resource::Buffer(view)),
+                ("trees", Resource::Texels(&cull.trees)),
+                ("species", Resource::Buffer(&forest.species.table)),
+                ("draws", Resource::Buffer(&data.draws)),
+                ("mesh_trees", Resource::Buffer(&data.trees)),
+                ("corners", Resource::Texels(&data.corners)),
+                ("faces", Resource::Texels(&data.faces)),
+                ("envelopes", Resource::Texels(&data.envelopes)),
+                ("rule", Resource::Buffer(&data.rule)),
+                ("optics", Resource::Buffer(&data.optics)),
+                ("seen", Resource::Texels(seen)),
+                ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
+                ("depth", Resource::Texture(targets.depth.drawn(), Sampler::Nearest)),
+                ("quads_seen", Resource::Texture(quads_seen.drawn(), Sampler::Nearest)),
+            ];
+            pass.bind(&self.light, &[&all[..], &shown].concat());
+            pass.push(&self.parameters);
+            pass.dispatch([self.tiles[1], self.tiles[0], 1]);
+        });
+    }
+
+    /// That a frame drew all of its meshes.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when there were more than lists hold.
+    pub fn check(draws: &[MeshDraw]) -> Result<()> {
+        let total: u32 = draws.iter().map(|d| d.instance_count).sum();
+        if total > MESH_TREES {
+            return Err(Error::Usage(format!(
+                "{total} trees in view are near enough to be meshes, and {MESH_TREES} can be: raise mesh_min_pixels"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Has the draws of the species read back.
+    ///
+    /// # Errors
+    /// Those of [`Recorder::read`].
+    pub fn read_draws(&self, recorder: &mut Recorder, data: &MeshData) -> Result<Later<MeshDraw>> {
+        recorder.read(&data.draws, 0, data.species as usize)
+    }
+}

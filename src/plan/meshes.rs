@@ -1,0 +1,65 @@
+//! What a plan lists for trees that are their models' meshes.
+
+use super::Plan;
+use super::items::Items;
+use super::names::resource;
+use crate::gpu::interface::{MESH_TREES, MeshDraw, MeshFace};
+use crate::gpu::{BufferDesc, Description, ImageDesc, vk};
+use crate::scene::{Mesh, Scene};
+
+/// Format and bytes of the texels as which corners, faces and envelopes are read.
+const WORDS: (vk::Format, u64) = (vk::Format::R32G32B32A32_UINT, 16);
+/// Bytes of a corner: its place and its texture coordinates.
+const CORNER_BYTES: u64 = 16;
+/// Texels along a side of a leaf mask, at most and at least.
+const MASK_SIDES: [u32; 2] = [16, 1024];
+
+/// Texels along a side of the masks of some meshes, which are layers of one array: as many as the largest has; and how many there are.
+/// A material without holes has none.
+pub fn leaf_masks<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> (u32, u32) {
+    let [least, most] = MASK_SIDES;
+    let masked = meshes.flat_map(|m| &m.materials).filter(|m| m.alpha_cutoff.is_some());
+    let sides = masked.filter_map(|m| m.texture.as_ref()).map(|t| t.width.max(t.height));
+    let sides: Vec<u32> = sides.collect();
+    let side = sides.iter().copied().max().unwrap_or(least).clamp(least, most);
+    (side.next_power_of_two().min(most), sides.len() as u32)
+}
+
+/// 16-byte words of a triangle's envelope, eight half floats each.
+pub fn envelope_words(directions: u32) -> u32 {
+    directions.div_ceil(8)
+}
+
+impl Plan {
+    /// Corners, faces, crowns around leaves, and holes.
+    pub(super) fn list_meshes(&self, scene: &Scene, items: &mut Items) {
+        let words = |name, bytes| BufferDesc { texels: Some(WORDS), ..BufferDesc::new(name, bytes) };
+        let triangles: u64 = scene.species.iter().map(|s| s.mesh.triangles.len() as u64).sum();
+        let corners = words(resource::MESH_CORNERS, 3 * triangles * CORNER_BYTES);
+        let faces = words(resource::MESH_FACES, triangles * size_of::<MeshFace>() as u64);
+        let reason = format!(
+            "{} models, whose triangles are drawn to {:.0} m",
+            scene.species.len(),
+            self.last_mesh_range()
+        );
+        items.add("data", "meshes", reason, [corners, faces]);
+        let directions = scene.settings.leaf_directions;
+        let envelopes = words(resource::ENVELOPES, triangles * 16 * u64::from(envelope_words(directions)));
+        let reason = format!("how thick the crown around each leaf is in {directions} directions");
+        items.add("data", "leaf envelopes", reason, [envelopes]);
+        let (side, layers) = leaf_masks(scene.species.iter().map(|s| s.mesh.as_ref()));
+        if layers > 0 {
+            let image = ImageDesc {
+                layers,
+                levels: side.ilog2() + 1,
+                ..ImageDesc::plain(resource::LEAF_MASKS, vk::Format::R8_UNORM, [side; 2])
+            };
+            items.add("data", "leaf masks", format!("{layers} materials have holes"), [image]);
+        }
+        let draws =
+            BufferDesc::new(resource::MESH_DRAWS, (scene.species.len() * size_of::<MeshDraw>()) as u64);
+        let trees = BufferDesc::new(resource::MESH_TREES, 4 * u64::from(MESH_TREES));
+        let all: [Description; 2] = [draws.into(), trees.into()];
+        items.add("target", "mesh trees", format!("up to {MESH_TREES} trees are meshes"), all);
+    }
+}
