@@ -24,6 +24,7 @@ const uint TILE_SIDE = 8u;            // pixels along a side of a tile
 const uint SIGHT_TEXELS = 8u;         // 16-byte words of a tree's record for finding its visible samples
 const uint MESH_TREES = 4096u;        // most trees in view that are meshes: 12 bits of what a sample sees
 const uint MESH_TRIANGLES = 524288u;  // most triangles of a mesh: 19 bits of it
+const uint HIDING_STEPS = 16u;        // steps of height above the ground for which what trees hide of the sky is known
 const uint MESH_SEEN = 0x80000000u;   // of what a sample sees: a mesh's tree << 19 | triangle, not a quad of the ground
 const uint COVER_SCRATCH = 16u;       // coverage tiles of one scratch word a texel that the scratch buffer holds
 const float FADE_FIRST = 0.9;         // part of its range at which the first of a species' trees has faded out
@@ -44,6 +45,7 @@ struct View {
     vec4 bins[8];                     // squared upper distances of the distance bins
     vec3 sun_direction;               // unit, towards the sun
     uint cascade_count;               // 0: no sun
+    uint mesh_cascades;               // of these, the first ones into which meshes cast: single leaves are told apart there
     vec3 cascade_x;                   // unit, axis x of all cascades
     vec3 cascade_y;                   // unit, axis y
     vec3 sun_irradiance;              // on a plane facing the sun, times the exposure scale
@@ -223,6 +225,12 @@ struct MeshParameters {
     uint species_count;               // of the scene
 };
 
+// What lighting meshes takes.
+struct MeshLightParameters {
+    uvec2 size;                       // of the image, pixels
+    vec2 heights;                     // to which what trees hide of the sky is known, m; steps of it a metre
+};
+
 // A triangle of a mesh.
 struct MeshFace {
     uint mask;                        // layer of the array of masks; NO_PAGE: no holes
@@ -240,6 +248,14 @@ struct Caster {
     vec2 light_weights;               // of the first two views
     float mip;                        // of the views
     uint dither;                      // hash; its last 8 bits: the tree's name in the map
+};
+
+// A draw of vertices without indices.
+struct PlainDraw {
+    uint vertex_count;                // vertices
+    uint instance_count;              // instances
+    uint first_vertex;                // first vertex
+    uint first_instance;              // first instance
 };
 
 // What finding casters takes.

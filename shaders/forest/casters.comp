@@ -17,6 +17,7 @@ layout(std430, binding = 5) readonly buffer Seeds { Seed items[]; } seeds;
 layout(std140, binding = 6) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
 layout(std430, binding = 7) writeonly buffer Casters { Caster items[]; } casters;
 layout(std430, binding = 8) buffer Commands { DrawCommand items[]; } commands;
+layout(std430, binding = 9) buffer MeshCommands { PlainDraw items[]; } mesh_commands; // of the same casters as meshes
 layout(push_constant) uniform Push { CasterParameters p; };
 layout(constant_id = 0) const int VIEW_RINGS = 9;
 layout(constant_id = 1) const float VIEW_RESOLUTION = 256.0;
@@ -80,6 +81,7 @@ void main() {
     }
     rank += uint(bitCount(members[word] & (bit - 1u)));
     if (thread == 0u && count > 0u) {
+        atomicAdd(mesh_commands.items[p.first_command + q.block].instance_count, count);
         first_record = q.base + atomicAdd(commands.items[p.first_command + q.block].index_count, 6u * count) / 6u;
     }
     barrier();

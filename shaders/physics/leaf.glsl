@@ -1,7 +1,7 @@
 // Light on a leaf among leaves by its envelope (BBP08, section 4). Twin: src/physics/leaf.rs, where the forms are derived.
 //
 // An envelope is the optical thickness of the crown around a leaf in LEAF_DIRECTIONS directions, eight half floats a texel. `rule` has two
-// vec4s a direction: the direction and its weight, and what of its cell of the sphere is sky.
+// vec4s a direction: the direction and its weight, and the integral of unit vectors over what of its cell of the sphere is sky.
 
 struct LeafLight {
     vec2 sky;   // what of an even sky's irradiance arrives on the front, and on the back
@@ -14,16 +14,20 @@ float leaf_lobe(float cosine, int power) {
     return power == 1 ? c : power == 2 ? squared : squared * squared * squared;
 }
 
-// Two neighbouring directions of an envelope; `thickness` is that along the first and the second.
-void leaf_direction(inout LeafLight light, inout vec2 sides, inout float towards, vec4 direction, float open, float thickness, vec3 n,
+// Adds a direction of an envelope; `others` is what the trees around leave of the sky there.
+void leaf_direction(inout LeafLight light, inout vec2 sides, inout float towards, vec4 direction, vec3 sky, float others, float thickness, vec3 n,
                     vec3 sun, int power) {
-    float left = exp(-thickness), cosine = direction.w * dot(n, direction.xyz);
-    vec2 part = max(vec2(cosine, -cosine), 0.0);
-    float lobe = direction.w * leaf_lobe(dot(sun, direction.xyz), power);
-    sides += part;
-    light.sky += part * (left * open);
+    float left = exp(-thickness), cosine = dot(n, sky), lobe = direction.w * leaf_lobe(dot(sun, direction.xyz), power);
+    vec2 faced = max(vec2(cosine, -cosine), 0.0);
+    sides += faced;
+    light.sky += faced * (left * others);
     towards += lobe;
     light.sun += lobe * left;
+}
+
+// Makes means of the sums; an even sky that nothing hides brings (1 +- n_z) / 2.
+LeafLight leaf_means(LeafLight light, vec2 sides, float towards, vec3 n) {
+    return LeafLight(light.sky / max(sides, 1e-9) * (0.5 + 0.5 * vec2(n.z, -n.z)), light.sun / max(towards, 1e-9));
 }
 
 // Radiance that one side of a leaf sends per irradiance on it (BBP08, eq. 4): the sun's, and of a sky whose irradiance on either side is `sky`.

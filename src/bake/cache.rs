@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use super::envelope::{Envelopes, Parts, RAYS};
 use super::file::{Fields, Format, load_or_build};
+use super::hiding::HEIGHTS;
 use super::surface::Surface;
 use super::{
     BakeSettings, ForestSettings, SpeciesBake, Turned, bake_transfer, bake_views, check, load_or_measure,
@@ -26,7 +27,7 @@ use crate::scene::{Mesh, OpticsOverride};
 
 const VIEWS: Format = Format { magic: *b"CANOPYZF", version: 14, extension: "zfield" };
 const TRANSFER: Format = Format { magic: *b"CANOPYLT", version: 4, extension: "transfer" };
-const ENVELOPES: Format = Format { magic: *b"CANOPYLE", version: 1, extension: "envelopes" };
+const ENVELOPES: Format = Format { magic: *b"CANOPYLE", version: 4, extension: "envelopes" };
 /// Numbers at the head of a file of views.
 const SCALARS: usize = 23 + 4 * TERMS;
 
@@ -155,19 +156,16 @@ impl<'a> Source<'a> {
         let parts = Parts::new(self.mesh, &surface);
         load_or_build(
             (self.dir, &ENVELOPES, &envelopes_key(self.mesh, directions)),
-            &[4 * parts.count * rule.len()],
+            &[2 * 4 * parts.count * rule.len(), 4 * HEIGHTS * rule.len()],
             |read| Envelopes {
                 parts: parts.clone(),
-                thickness: read[0]
-                    .as_chunks::<4>()
-                    .0
-                    .iter()
-                    .map(|b| f64::from(f32::from_le_bytes(*b)))
-                    .collect(),
+                thickness: floats(&read[0]),
                 directions: rule.len(),
+                hiding: floats(&read[1]),
             },
             |built, put| {
-                put(&built.thickness.iter().flat_map(|t| (*t as f32).to_le_bytes()).collect::<Vec<u8>>())
+                put(&bytes(&built.thickness))?;
+                put(&bytes(&built.hiding))
             },
             || Ok(Envelopes::new(&surface, parts.clone(), &rule, RAYS, self.quiet)),
             self.quiet,
@@ -218,6 +216,15 @@ fn transfer_key(views: &[u8; 32], bands: u32) -> Option<[u8; 32]> {
     fields.put(&bands.to_le_bytes());
     fields.put(views);
     (bands > 0).then(|| fields.key())
+}
+
+/// Numbers of single precision, as they are kept.
+fn floats(bytes: &[u8]) -> Vec<f64> {
+    bytes.as_chunks::<4>().0.iter().map(|b| f64::from(f32::from_le_bytes(*b))).collect()
+}
+
+fn bytes(floats: &[f64]) -> Vec<u8> {
+    floats.iter().flat_map(|x| (*x as f32).to_le_bytes()).collect()
 }
 
 /// BLAKE3 of everything that the envelopes of a mesh depend on.

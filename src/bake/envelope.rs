@@ -9,6 +9,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::hiding::hiding;
 use super::occlusion::sphere_direction;
 use super::surface::{Caster, Face, Surface};
 use crate::physics::hash::hash2;
@@ -40,10 +41,13 @@ pub struct Parts {
 pub struct Envelopes {
     /// Which faces are of which part.
     pub parts: Parts,
-    /// Optical thickness of the tree in each direction, part after part: numbers of single precision, as they are kept and drawn.
+    /// Optical thickness of the tree in each direction around what is seen of a part from above, and from below; part after part. Numbers of
+    /// single precision, as they are kept.
     pub thickness: Vec<f64>,
     /// Directions a part.
     pub directions: usize,
+    /// What the tree hides of the sky from its neighbours' leaves ([`super::hiding::hiding`]).
+    pub hiding: Vec<f64>,
 }
 
 impl Envelopes {
@@ -71,13 +75,21 @@ impl Envelopes {
             .map(|t| f64::from(t as f32))
             .collect();
         progress.finish();
-        Envelopes { parts, thickness, directions: directions.len() }
+        let hiding = hiding(surface, directions);
+        Envelopes { parts, thickness, directions: directions.len(), hiding }
     }
 
-    /// What a face's part knows.
-    pub fn of(&self, face: u32) -> &[f64] {
-        let first = self.parts.of[face as usize] as usize * self.directions;
-        &self.thickness[first..first + self.directions]
+    /// What a face's part knows: around what is seen of it from above, and from below.
+    pub fn of(&self, face: u32) -> [&[f64]; 2] {
+        let first = 2 * self.parts.of[face as usize] as usize * self.directions;
+        [0, 1].map(|side| &self.thickness[first + side * self.directions..][..self.directions])
+    }
+
+    /// The same around what is seen of it by a viewer in a direction of which this is the height, −1 to 1.
+    pub fn seen(&self, face: u32, height: f64) -> Vec<f64> {
+        let [above, below] = self.of(face);
+        let from = 0.5 + 0.5 * height;
+        above.iter().zip(below).map(|(a, b)| from * a + (1.0 - from) * b).collect()
     }
 }
 
@@ -157,11 +169,20 @@ fn place(surface: &Surface, faces: &[u32], k: u32) -> (Vec3, u32) {
     (a + (b - a) * s + (c - a) * t, on)
 }
 
-/// Thickness around what is seen of a leaf, from all sides on average.
+/// Rays of a direction, how many leave, and the same weighted by how open their places are to viewers above and below.
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    all: u32,
+    open: u32,
+    weight: [u32; 2],
+    weighted: [u32; 2],
+}
+
+/// Thickness around what is seen of a part from above, and from below.
 ///
-/// A viewer outside sees a place of it with the probability that a ray leaves from there, its openness o. So what the light of a direction
-/// finds there, V (1 or 0), has the mean Σ o V / Σ o over places: more than Σ V, because open places are open to all. A ray's own V is left
-/// out of its place's o, or its noise would count as openness.
+/// A viewer outside sees a place of it with the probability that a ray leaves from there to his side, its openness o. So what the light of a
+/// direction finds there, V (1 or 0), has the mean Σ o V / Σ o over places: more than Σ V, because open places are open to all, and most
+/// where light and viewer are on the same side. A ray's own V is left out of its place's o, or its noise would count as openness.
 fn thickness(
     (caster, own): (&Caster, impl Fn(u32, u32) -> bool),
     origin: impl Fn(u32) -> (Vec3, u32),
@@ -171,32 +192,40 @@ fn thickness(
     stack: &mut Stack,
 ) -> Vec<f64> {
     let places = (rays * directions.len() as u32).div_ceil(RAYS_A_PLACE);
-    // Rays, those that leave, and the same weighted by openness.
-    let mut cells = vec![[0u32; 4]; directions.len()];
+    let mut cells = vec![Cell::default(); directions.len()];
     for place in 0..places {
         let ((origin, on), seeds) = (origin(place), [0, 1].map(|half| hash2(seed, 2 * place + half)));
         let own = |face| own(on, face);
-        let found: [(usize, bool); RAYS_A_PLACE as usize] = std::array::from_fn(|k| {
+        let found: [(usize, usize, u32); RAYS_A_PLACE as usize] = std::array::from_fn(|k| {
             let w = sphere_direction(k as u32, RAYS_A_PLACE, seeds);
-            (directions.nearest(w.as_dvec3().to_array()), !caster.occluded_by_others(origin, w, &own, stack))
+            let leaves = !caster.occluded_by_others(origin, w, &own, stack);
+            (directions.nearest(w.as_dvec3().to_array()), usize::from(w.z < 0.0), u32::from(leaves))
         });
-        let open = found.iter().filter(|(_, leaves)| *leaves).count() as u32;
-        for (cell, leaves) in found {
-            let (leaves, cell) = (u32::from(leaves), &mut cells[cell]);
-            let others = open - leaves;
-            for (sum, more) in cell.iter_mut().zip([1, leaves, others, others * leaves]) {
-                *sum += more;
+        let mut open = [0; 2];
+        found.iter().for_each(|(_, side, leaves)| open[*side] += leaves);
+        for (cell, side, leaves) in found {
+            // Of cells that straddle the horizon what is above it counts: there are sky and sun.
+            if side == 1 && directions.to[cell][2] > -1e-9 {
+                continue;
+            }
+            let cell = &mut cells[cell];
+            cell.all += 1;
+            cell.open += leaves;
+            for viewer in 0..2 {
+                let others = open[viewer] - if viewer == side { leaves } else { 0 };
+                cell.weight[viewer] += others;
+                cell.weighted[viewer] += others * leaves;
             }
         }
     }
-    let thickness = |[all, open, weight, weighted]: [u32; 4]| match (all, open, weighted) {
+    let thickness = |c: &Cell, viewer: usize| match (c.all, c.open, c.weighted[viewer]) {
         (0, ..) => 0.0,
-        (_, 0, _) => (2.0 * f64::from(all)).ln(),
-        // Single rays leave from places that are open to nothing else.
-        (_, _, 0) => (f64::from(all) / f64::from(open)).ln(),
-        _ => (f64::from(weight) / f64::from(weighted)).ln(),
+        (all, 0, _) => (2.0 * f64::from(all)).ln(),
+        // Single rays leave from places that are open to nothing else on that side.
+        (all, open, 0) => (f64::from(all) / f64::from(open)).ln(),
+        (_, _, weighted) => (f64::from(c.weight[viewer]) / f64::from(weighted)).ln(),
     };
-    cells.into_iter().map(thickness).collect()
+    [0, 1].iter().flat_map(|viewer| cells.iter().map(|c| thickness(c, *viewer)).collect::<Vec<_>>()).collect()
 }
 
 #[cfg(test)]
@@ -250,8 +279,8 @@ mod tests {
         assert_eq!((open.parts.leaves, &open.parts.of[..4]), (4, &[0, 0, 1, 1][..]));
         for (k, w) in directions.to.iter().enumerate() {
             // The small square below takes a thousandth of the lower cell.
-            assert!(open.of(0)[k] < 0.1, "{w:?}: {}", open.of(0)[k]);
-            let t = roofed.of(0)[k];
+            assert!(open.of(0)[0][k] < 0.1, "{w:?}: {}", open.of(0)[0][k]);
+            let t = roofed.of(0)[1][k];
             match w[2] {
                 z if z > 0.5 => assert!(t > 64f64.ln(), "{w:?}: {t}"),
                 z if z < -0.5 => assert!(t < 0.1, "{w:?}: {t}"),

@@ -5,6 +5,7 @@ mod correction;
 pub mod envelope;
 #[doc(hidden)]
 pub mod file;
+pub mod hiding;
 mod least_squares;
 pub(crate) mod occlusion;
 pub(crate) mod optics;

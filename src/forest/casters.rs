@@ -11,7 +11,7 @@ use super::seeds::{FreshSeeds, SeedData};
 use super::species::SpeciesData;
 use crate::camera::cascades::Cascade;
 use crate::gpu::interface::{
-    CULL_GROUP, CasterParameters, CasterQuad, DrawCommand, Seed, SeedQuad, ShadowBlock, Species,
+    CULL_GROUP, CasterParameters, CasterQuad, DrawCommand, PlainDraw, Seed, SeedQuad, ShadowBlock, Species,
 };
 use crate::gpu::{Buffer, Gpu, Later, Layers, Program, Recorder, Resource, shaders};
 use crate::land::quadtree::{Quadtree, grid_cells};
@@ -25,6 +25,8 @@ use crate::{Error, Result};
 pub struct DrawnBlock {
     /// Index of its cascade.
     pub cascade: usize,
+    /// Metres a texel of that.
+    pub texel: f64,
     /// Where it is.
     pub block: Block,
     /// The pages drawn, in the cascade's square.
@@ -46,6 +48,10 @@ pub struct CasterData {
     pub casters: Buffer,
     /// Draw commands: one a block, batch after batch.
     pub commands: Buffer,
+    /// The same for casters that are drawn as meshes.
+    pub mesh_commands: Buffer,
+    /// Corners of the largest mesh.
+    mesh_corners: u32,
     /// What this frame finds and draws.
     pub work: CasterWork,
     quads: Buffer,
@@ -81,6 +87,14 @@ impl CasterWork {
     pub fn command(&self, batch: usize, block: usize) -> u64 {
         ((batch * self.blocks + block) * size_of::<DrawCommand>()) as u64
     }
+
+    /// The same of casters that are drawn as meshes, and the first record.
+    pub fn mesh_command(&self, batch: usize, block: usize) -> (u64, u32) {
+        let (first, count) = self.batches[batch].quads;
+        let quads = &self.quads[first as usize..][..count as usize];
+        let base = quads.iter().find(|q| q.block as usize == block).map_or(0, |q| q.base);
+        (((batch * self.blocks + block) * size_of::<PlainDraw>()) as u64, base)
+    }
 }
 
 /// A batch while it is filled.
@@ -105,6 +119,8 @@ impl CasterData {
         Ok(CasterData {
             casters: gpu.described_buffer(&plan.buffer(resource::CASTERS))?,
             commands: gpu.buffer("caster draws", 64 * size_of::<DrawCommand>() as u64)?,
+            mesh_commands: gpu.buffer("mesh caster draws", 64 * size_of::<PlainDraw>() as u64)?,
+            mesh_corners: 3 * scene.species.iter().map(|s| s.mesh.triangles.len() as u32).max().unwrap_or(0),
             work: CasterWork::default(),
             quads: gpu.buffer("caster quads", 4096 * size_of::<CasterQuad>() as u64)?,
             seed_quads: gpu.buffer("caster seed quads", 1024 * size_of::<SeedQuad>() as u64)?,
@@ -164,6 +180,9 @@ impl CasterData {
         recorder.renew(&mut self.quads, "caster quads", &work.quads)?;
         recorder.renew(&mut self.seed_quads, "caster seed quads", &fresh)?;
         recorder.renew(&mut self.commands, "caster draws", &draw_commands(&work))?;
+        let none = PlainDraw { vertex_count: self.mesh_corners, ..bytemuck::Zeroable::zeroed() };
+        let none = vec![none; work.batches.len() * work.blocks];
+        recorder.renew(&mut self.mesh_commands, "mesh caster draws", &none)?;
         self.work = work;
         Ok(())
     }
@@ -204,6 +223,7 @@ impl CasterData {
                     ("species", Resource::Buffer(&species.table)),
                     ("casters", Resource::Buffer(&self.casters)),
                     ("commands", Resource::Buffer(&self.commands)),
+                    ("mesh_commands", Resource::Buffer(&self.mesh_commands)),
                 ],
             );
             let groups_per_region = seeds.region_capacity / CULL_GROUP;

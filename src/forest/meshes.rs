@@ -4,14 +4,17 @@ use glam::Vec2;
 use half::f16;
 
 use crate::bake::envelope::Envelopes;
+use crate::bake::hiding::{self, HEIGHTS};
 use crate::bake::surface::{Face, Mask, Surface};
 use crate::bake::{Baked, SpeciesBake};
-use crate::gpu::interface::{MAX_SPECIES, MESH_TRIANGLES, MeshDraw, MeshFace, NO_PAGE};
+use crate::forest::species::mean_squared_scale;
+use crate::gpu::interface::{HIDING_STEPS, MAX_SPECIES, MESH_TRIANGLES, MeshDraw, MeshFace, NO_PAGE};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
+use crate::physics::crown::Crown;
 use crate::physics::leaf::Directions;
 use crate::plan::names::resource;
 use crate::plan::{Plan, envelope_words};
-use crate::scene::{Scene, Species};
+use crate::scene::{Distribution, Scene, Species};
 use crate::{Error, Result};
 
 /// Steps of texture coordinates along a texture; as `UV_STEPS` in `shaders/frame/trees/meshes/corner.glsl`.
@@ -35,6 +38,10 @@ pub struct MeshData {
     pub trees: Buffer,
     /// Directions of envelopes with their weights, and what of their cells is sky.
     pub rule: Buffer,
+    /// What trees hide of the sky from neighbours: a step of height a texel, direction by direction.
+    pub hiding: Buffer,
+    /// Height to which those steps go, m.
+    pub top: f32,
     /// Reflectance and transmittance of leaves, and reflectance of bark, of each species.
     pub optics: Buffer,
     /// Number of species.
@@ -72,6 +79,7 @@ impl MeshData {
                 })?;
             all.add(species, envelopes)?;
         }
+        let (pairs, top) = hiding_pairs(scene, baked, rule.len());
         let texels = |name, bytes: &[u8]| -> Result<Buffer> {
             // Faces that are nowhere to be seen are in the plan, and not here.
             let described = plan.buffer(name);
@@ -87,6 +95,8 @@ impl MeshData {
             draws: gpu.described_buffer_with(&plan.buffer(resource::MESH_DRAWS), &all.draws)?,
             trees: gpu.described_buffer(&plan.buffer(resource::MESH_TREES))?,
             rule: gpu.buffer_with("leaf directions", &rule_block(&rule))?,
+            hiding: gpu.described_buffer_with(&plan.buffer(resource::HIDING), &pairs)?,
+            top: top as f32,
             optics: gpu.buffer_with("leaf optics", &optics_block(baked))?,
             species: all.draws.len() as u32,
             power: rule.power as u32,
@@ -117,8 +127,10 @@ impl Content {
                 foliage: u32::from(!any || mesh.materials[face.material as usize].foliage),
                 spare: [0; 2],
             });
-            let around = envelopes.of(k).iter().map(|t| f16::from_f64(*t));
-            self.envelopes.extend(around.chain(std::iter::repeat(f16::ZERO)).take(words));
+            for around in envelopes.of(k) {
+                let halves = around.iter().map(|t| f16::from_f64(*t));
+                self.envelopes.extend(halves.chain(std::iter::repeat(f16::ZERO)).take(words));
+            }
         }
         self.masks.extend(surface.masks);
         self.draws.push(MeshDraw {
@@ -145,16 +157,63 @@ fn bits(halves: &[f16]) -> Vec<u16> {
     halves.iter().map(|h| h.to_bits()).collect()
 }
 
-/// Directions as the shader takes them: each with its weight, and what of its cell of the sphere is sky.
+/// Directions as the shader takes them: each with its weight, and how a surface faces what of its cell of the sphere is sky.
 fn rule_block(rule: &Directions) -> Vec<[f32; 4]> {
-    let sky = rule.means(|w| f64::from(u8::from(w[2] > 0.0)));
     let mut block = Vec::new();
-    for ((to, weight), sky) in rule.to.iter().zip(&rule.weights).zip(sky) {
+    for ((to, weight), sky) in rule.to.iter().zip(&rule.weights).zip(rule.half(true)) {
         block.push([to[0], to[1], to[2], *weight].map(|x| x as f32));
-        block.push([sky as f32, 0.0, 0.0, 0.0]);
+        block.push([sky[0], sky[1], sky[2], 0.0].map(|x| x as f32));
     }
     block.resize(2 * MOST_DIRECTIONS, [0.0; 4]);
     block
+}
+
+/// What the scene's trees hide of the sky at heights above the ground, evenly to the top of the tallest of middle scale: of each direction, pairs of
+/// what it is at a step and how much more at the next, a unit of the optical thickness of all crowns. Species share that as they do in the whole
+/// scene: where each of them stands is not known. Also the height of the top, m.
+fn hiding_pairs(scene: &Scene, baked: &[Baked], directions: usize) -> (Vec<[f32; 2]>, f64) {
+    let frames: Vec<(Crown, f64)> = scene
+        .species
+        .iter()
+        .zip(baked)
+        .map(|(s, b)| (b.species.crown, 0.5 * f64::from(s.scale[0] + s.scale[1])))
+        .collect();
+    let top_of =
+        |(crown, scale): &(Crown, f64)| f64::from(crown.frame.centre + crown.frame.half_height) * scale;
+    let top = frames.iter().map(top_of).fold(1e-3, f64::max);
+    let shares: Vec<f64> =
+        scene.species.iter().zip(&frames).map(|(s, (crown, _))| thickness(scene, s, crown)).collect();
+    let total = shares.iter().sum::<f64>().max(1e-12);
+    let at = |direction: usize, metres: f64| -> f64 {
+        let of = |k: usize| {
+            let (crown, scale) = &frames[k];
+            let height =
+                (metres / scale - f64::from(crown.frame.centre)) / f64::from(crown.frame.half_height);
+            let nodes =
+                baked[k].envelopes.as_ref().map_or(&[][..], |e| &e.hiding[direction * HEIGHTS..][..HEIGHTS]);
+            if nodes.is_empty() { 0.0 } else { shares[k] / total * hiding::at_height(nodes, height) }
+        };
+        (0..frames.len()).map(of).sum()
+    };
+    let steps = HIDING_STEPS as usize;
+    let node = |direction: usize, step: usize| at(direction, top * step as f64 / steps as f64);
+    let pair = |k: usize| {
+        let (direction, step) = (k / steps, k % steps);
+        let here = node(direction, step);
+        [here, node(direction, step + 1) - here].map(|x| x as f32)
+    };
+    ((0..directions * steps).map(pair).collect(), top)
+}
+
+/// Optical thickness of a species' crowns from above in all of a scene, at its full density.
+fn thickness(scene: &Scene, species: &Species, crown: &Crown) -> f64 {
+    let density = match &species.distribution {
+        Distribution::Density { max_density, .. } => f64::from(*max_density),
+        Distribution::Positions(list) => {
+            list.len() as f64 / (scene.terrain.extent[0] * scene.terrain.extent[1])
+        }
+    };
+    density * std::f64::consts::PI * f64::from(crown.radius).powi(2) * mean_squared_scale(species)
 }
 
 fn optics_block(baked: &[Baked]) -> Vec<[f32; 4]> {

@@ -210,7 +210,7 @@ fn view_bases(field: &ZField) -> Vec<ViewBasis> {
 }
 
 /// Mean of the squared scale of a species' trees.
-fn mean_squared_scale(species: &Species) -> f64 {
+pub(super) fn mean_squared_scale(species: &Species) -> f64 {
     let drawn = tables::mean_squared_scale(species.scale);
     match &species.distribution {
         Distribution::Positions(list) if !list.is_empty() => {

@@ -7,6 +7,7 @@ use crate::Result;
 use crate::camera::Eye;
 use crate::camera::cascades::{Cascade, cascades};
 use crate::forest::casters::{CasterData, DrawnBlock};
+use crate::forest::meshes::MeshData;
 use crate::forest::pages::{Block, Held, blocks};
 use crate::forest::seeds::SeedData;
 use crate::forest::species::SpeciesData;
@@ -34,6 +35,14 @@ struct GroundPush {
     texels_per_step: f32,
 }
 
+/// Push constants of a draw of meshes.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct MeshPush {
+    block: ShadowBlock,
+    first_caster: u32,
+}
+
 /// Shadow maps and the programs that draw them.
 pub struct Shadows {
     /// Depth of the caster nearest the sun, one layer a cascade; it repeats.
@@ -49,12 +58,15 @@ pub struct Shadows {
     /// Indices of a square's mesh.
     indices: Buffer,
     programs: Programs,
+    /// Side of leaves, m: where a cascade tells them apart meshes cast into it.
+    leaf_side: f64,
 }
 
 /// What draws: without relief no ground, and trees if any are drawn by themselves.
 struct Programs {
     ground: Option<Program>,
     trees: Option<Program>,
+    meshes: Option<Program>,
 }
 
 /// What a frame draws.
@@ -75,6 +87,8 @@ pub struct CastingTrees<'a> {
     pub seeds: &'a SeedData,
     /// Their species.
     pub species: &'a SpeciesData,
+    /// What those are drawn from that cast as meshes, where any do.
+    pub meshes: Option<&'a MeshData>,
 }
 
 impl Shadows {
@@ -93,17 +107,25 @@ impl Shadows {
         let s = &scene.settings;
         let views = [("VIEW_RINGS", s.view_rings), ("VIEW_RESOLUTION", (s.view_resolution as f32).to_bits())];
         let chosen = gpu.info().vertex_layers;
-        let (ground, trees) = match chosen {
-            true => (&shaders::FRAME_TERRAIN_SHADOW_VERT, &shaders::FRAME_TREES_ZFIELD_SHADOW_VERT),
-            false => {
-                (&shaders::FRAME_TERRAIN_SHADOW_LAYER_VERT, &shaders::FRAME_TREES_ZFIELD_SHADOW_LAYER_VERT)
-            }
+        let (ground, trees, meshes) = match chosen {
+            true => (
+                &shaders::FRAME_TERRAIN_SHADOW_VERT,
+                &shaders::FRAME_TREES_ZFIELD_SHADOW_VERT,
+                &shaders::FRAME_TREES_MESHES_SHADOW_VERT,
+            ),
+            false => (
+                &shaders::FRAME_TERRAIN_SHADOW_LAYER_VERT,
+                &shaders::FRAME_TREES_ZFIELD_SHADOW_LAYER_VERT,
+                &shaders::FRAME_TREES_MESHES_SHADOW_LAYER_VERT,
+            ),
         };
         // Level ground shades nothing.
         let ground = (on && scene.terrain.heights.is_some())
             .then(|| program(ground, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[]));
         let trees =
             (on && plan.z_fields).then(|| program(trees, &shaders::FRAME_TREES_ZFIELD_SHADOW_FRAG, &views));
+        let meshes =
+            (on && plan.meshes).then(|| program(meshes, &shaders::FRAME_TREES_MESHES_SHADOW_FRAG, &[]));
         let side = SHADOW_CELLS + 1;
         let cells = (0..SHADOW_CELLS * SHADOW_CELLS).map(|k| k % SHADOW_CELLS + side * (k / SHADOW_CELLS));
         let indices: Vec<u32> =
@@ -121,8 +143,18 @@ impl Shadows {
             sums: gpu.buffer("shadow page sums", 0)?,
             squares: gpu.buffer("casting ground", 1024 * size_of::<GroundCaster>() as u64)?,
             indices: gpu.buffer_with("casting ground indices", &indices)?,
-            programs: Programs { ground: ground.transpose()?, trees: trees.transpose()? },
+            programs: Programs {
+                ground: ground.transpose()?,
+                trees: trees.transpose()?,
+                meshes: meshes.transpose()?,
+            },
+            leaf_side: plan.leaf_side,
         })
+    }
+
+    /// How many of the cascades meshes cast into: the first ones.
+    pub fn mesh_cascades(plan: &Plan, cascades: &[Cascade]) -> usize {
+        cascades.iter().take_while(|c| tells_leaves(c.grid.texel, plan.leaf_side)).count()
     }
 
     /// The cascades of an eye.
@@ -160,7 +192,7 @@ impl Shadows {
         for (k, (cascade, pages)) in cascades.iter().zip(&fresh).enumerate() {
             for (block, pages) in blocks(cascade, pages) {
                 let gpu = shader_block(cascade, k, &block, 0.5 * (lowest + highest), sums.len());
-                work.blocks.push(DrawnBlock { cascade: k, block, pages, gpu });
+                work.blocks.push(DrawnBlock { cascade: k, texel: cascade.grid.texel, block, pages, gpu });
             }
             if !pages.is_empty() {
                 sums.extend(pages.sums());
@@ -219,6 +251,9 @@ impl Shadows {
                     }
                     if let (Some(program), Some(t)) = (&self.programs.trees, trees) {
                         self.draw_trees(pass, program, view, (work, *layers), t, batch);
+                    }
+                    if let (Some(program), Some(t)) = (&self.programs.meshes, trees) {
+                        self.draw_meshes(pass, program, (work, *layers), t, batch);
                     }
                 });
             }
@@ -279,13 +314,52 @@ impl Shadows {
         );
         for block in &b.blocks {
             let drawn = &work.blocks[*block];
-            if !drawn.in_layers(layers) {
+            if !drawn.in_layers(layers) || self.casts_meshes(drawn) {
                 continue;
             }
             self.scissor(pass, drawn);
             pass.push(&drawn.gpu);
             let command = trees.data.work.command(batch, *block);
             pass.draw_indexed_indirect(&trees.seeds.quad_indices, &trees.data.commands, command);
+        }
+    }
+
+    /// Whether trees cast into a block as meshes.
+    fn casts_meshes(&self, b: &DrawnBlock) -> bool {
+        self.programs.meshes.is_some() && tells_leaves(b.texel, self.leaf_side)
+    }
+
+    fn draw_meshes(
+        &self,
+        pass: &mut RenderPass,
+        program: &Program,
+        (work, layers): (&ShadowWork, Layers),
+        trees: CastingTrees,
+        batch: usize,
+    ) {
+        let (Some(b), Some(meshes)) = (trees.data.work.batches.get(batch), trees.meshes) else { return };
+        let wanted = |block: &&usize| {
+            work.blocks[**block].in_layers(layers) && self.casts_meshes(&work.blocks[**block])
+        };
+        if !b.blocks.iter().any(|block| wanted(&block)) {
+            return;
+        }
+        pass.bind(
+            program,
+            &[
+                ("casters", Resource::Buffer(&trees.data.casters)),
+                ("draws", Resource::Buffer(&meshes.draws)),
+                ("corners", Resource::Texels(&meshes.corners)),
+                ("faces", Resource::Texels(&meshes.faces)),
+                ("masks", Resource::Texture(&meshes.masks, Sampler::LinearRepeat)),
+            ],
+        );
+        for block in b.blocks.iter().filter(wanted) {
+            let drawn = &work.blocks[*block];
+            self.scissor(pass, drawn);
+            let (command, first_caster) = trees.data.work.mesh_command(batch, *block);
+            pass.push(&MeshPush { block: drawn.gpu, first_caster });
+            pass.draw_indirect(&trees.data.mesh_commands, command);
         }
     }
 
@@ -299,6 +373,11 @@ impl Shadows {
     fn page(&self) -> u32 {
         self.map.size()[0] / SHADOW_PAGES
     }
+}
+
+/// Whether a map of such texels tells leaves apart: two or more are as wide as one, m.
+fn tells_leaves(texel: f64, leaf_side: f64) -> bool {
+    texel <= 0.5 * leaf_side
 }
 
 /// A block as shaders take it; `ground` is the height that corners refer to, m, and `sums` where its cascade's sums begin.

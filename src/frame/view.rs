@@ -1,5 +1,6 @@
 //! The view buffer: everything of a frame that does not depend on the object drawn.
 
+use super::shadows::Shadows;
 use crate::camera::{Cascade, Eye, Light};
 use crate::forest::cull::bin_end;
 use crate::forest::seeds::SeedData;
@@ -55,6 +56,7 @@ pub fn view(
     let scaled = |c: [f64; 3]| c.map(|v| (v * light.scale) as f32);
     view.sun_direction = light.direction.map(|v| v as f32);
     view.cascade_count = cascades.len() as u32;
+    view.mesh_cascades = Shadows::mesh_cascades(plan, cascades) as u32;
     view.sun_irradiance = scaled(light.sun);
     view.sky_radiance = scaled(light.sky);
     view.camera_height = eye.position[2] as f32;

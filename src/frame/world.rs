@@ -93,7 +93,8 @@ impl Forest {
     /// What draws the trees that cast.
     fn casting(&self) -> Option<CastingTrees<'_>> {
         let data = self.near.as_ref()?.casters.as_ref()?;
-        Some(CastingTrees { data, seeds: &self.seeds, species: &self.species })
+        let meshes = self.near.as_ref()?.meshes.as_ref();
+        Some(CastingTrees { data, seeds: &self.seeds, species: &self.species, meshes })
     }
 }
 

@@ -1,7 +1,7 @@
 //! How well the light of leaves by their envelopes (BBP08) agrees with paths traced through the mesh: the paper's own figure 7, term by
 //! term, of a lone tree or a ball of leaves over ground.
 //!
-//! The tree is seen in parallel from around and from above. Where a ray meets a leaf, the model's radiance stands beside the truth, by
+//! The tree is seen in parallel from around, from above and from below. Where a ray meets a leaf, the model's radiance stands beside the truth, by
 //! rays from that very place. Single shadows of leaves are noise that the model leaves out by intent (section 3.4), so squares of
 //! 8 × 8 pixels are compared: the error of a term is the mean absolute difference of squares, over the term's mean.
 
@@ -16,7 +16,7 @@ use crate::bake::occlusion::sphere_direction;
 use crate::bake::optics::colours;
 use crate::bake::surface::{Caster, Surface};
 use crate::physics::hash::{Stream, hash2};
-use crate::physics::leaf::{Directions, Gather, Leaf, Sun, scattering};
+use crate::physics::leaf::{Directions, Gather, Leaf, Sun, hemisphere, scattering};
 use crate::physics::light::luminance;
 use crate::progress::Progress;
 use crate::rays::{Met, Stack};
@@ -29,8 +29,18 @@ const SQUARE: u32 = 8;
 /// Rays over the whole sphere from each pixel, for the truth.
 const TRUTH: u32 = 64;
 /// Views: zenith angle and azimuth from the sun's, degrees.
-const VIEWS: [[f64; 2]; 7] =
-    [[80.0, 0.0], [80.0, 60.0], [80.0, 120.0], [80.0, 180.0], [80.0, 240.0], [80.0, 300.0], [20.0, 90.0]];
+const VIEWS: [[f64; 2]; 10] = [
+    [80.0, 0.0],
+    [80.0, 60.0],
+    [80.0, 120.0],
+    [80.0, 180.0],
+    [80.0, 240.0],
+    [80.0, 300.0],
+    [20.0, 90.0],
+    [115.0, 0.0],
+    [115.0, 180.0],
+    [150.0, 90.0],
+];
 
 /// The light of a measurement: an even sky, the ground's light from below, and a sun of irradiance 1.
 #[derive(Clone, Copy, Debug)]
@@ -226,7 +236,7 @@ impl Tree<'_> {
         let envelopes = Envelopes::new(self.surface, parts, directions, RAYS, quiet);
         let bake_s = begun.elapsed().as_secs_f64();
         let sun = Sun::new(directions, self.leaf, self.sun().to_array());
-        let around = directions.means(|w| self.around(w));
+        let around = [true, false].map(|above| directions.half(above));
         let model: Vec<[f64; 3]> =
             pixels.par_iter().map(|p| self.model(p, directions, &envelopes, &sun, &around)).collect();
         let squares = VIEWS.len() * (SIDE / SQUARE).pow(2) as usize;
@@ -256,15 +266,18 @@ impl Tree<'_> {
         directions: &Directions,
         envelopes: &Envelopes,
         sun: &Sun,
-        around: &[f64],
+        around: &[Vec<[f64; 3]>; 2],
     ) -> [f64; 3] {
-        let (envelope, gather) = (envelopes.of(p.face), Gather::new(directions, p.normal));
+        let (envelope, gather) =
+            (&envelopes.seen(p.face, p.viewer[2])[..], Gather::new(directions, p.normal));
+        let left = |k: usize| (-envelope[k]).exp();
+        let [sky, ground] = [true, false].map(|above| {
+            let lit = hemisphere(&around[usize::from(!above)], above, p.normal, left);
+            (0..2).map(|side| self.leaf.scattered(side, p.side) * lit[side]).sum::<f64>()
+        });
+        let sky = self.light.sky * (sky + self.light.ground * ground);
         let direct = scattering(self.leaf, p.normal, p.viewer, self.sun().to_array());
-        [
-            gather.radiance(self.leaf, p.side, |k| (-envelope[k]).exp() * around[k]),
-            direct * sun.visible(envelope),
-            gather.radiance(self.leaf, p.side, |k| sun.bounce(envelope, k)),
-        ]
+        [sky, direct * sun.visible(envelope), gather.radiance(self.leaf, p.side, |k| sun.bounce(envelope, k))]
     }
 }
 

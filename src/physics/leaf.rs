@@ -8,6 +8,8 @@
 //! Departures, each measured by `canopy leaves`:
 //! - Directions have the weights of a Lebedev rule instead of 1/N each, which for 8 is the same: 14 and 26 integrate polynomials of degree
 //!   5 and 7.
+//! - The sky's light comes from above the horizon: of cells that straddle it, what is above counts, from its own middle direction
+//!   ([`hemisphere`]).
 //! - What a leaf gathers is brought to the exact integral of its own cosine ([`Gather`]), so that a constant sky lights an open leaf
 //!   rightly whatever its normal is; with the bare sum of 8 directions of eq. 6 it is −18 to +15 % off.
 //! - Towards the sun the mean over directions is of what the foliage leaves of its light, not of thicknesses, and with more directions nearer
@@ -92,6 +94,29 @@ impl Gather {
             |(k, c): (usize, &f64)| leaf.scattered(usize::from(*c < 0.0), seen) * c.abs() * incoming(k);
         self.cosines.iter().enumerate().map(part).sum::<f64>() / PI
     }
+}
+
+/// Irradiance on the front and on the back of a leaf of one normal from an even sky (or ground) of radiance 1/π, of which `visible` is left in
+/// each direction; `half` is [`Directions::half`] of it.
+///
+/// The parts of the sphere are faced as they are, and what they leave out of the cosine where they straddle the leaf's plane is made good by the exact
+/// integral over the hemisphere: (1 ± n_z) / 2 of π.
+pub fn hemisphere(
+    half: &[[f64; 3]],
+    above: bool,
+    normal: [f64; 3],
+    visible: impl Fn(usize) -> f64,
+) -> [f64; 2] {
+    let up = if above { normal[2] } else { -normal[2] };
+    [1.0, -1.0].map(|side| {
+        let (mut all, mut left) = (0.0, 0.0);
+        for (k, cell) in half.iter().enumerate() {
+            let faced = (side * dot(*cell, normal)).max(0.0);
+            all += faced;
+            left += faced * visible(k);
+        }
+        if all > 0.0 { left / all * 0.5 * (1.0 + side * up) } else { 0.0 }
+    })
 }
 
 /// All that the sun's direction and the leaves' material say, the same for every leaf of a tree (G1, G2 and G3 of BBP08, eq. 18, 24

@@ -3,12 +3,14 @@
 use super::Plan;
 use super::items::Items;
 use super::names::resource;
-use crate::gpu::interface::{MESH_TREES, MeshDraw, MeshFace};
+use crate::gpu::interface::{HIDING_STEPS, MESH_TREES, MeshDraw, MeshFace};
 use crate::gpu::{BufferDesc, Description, ImageDesc, vk};
 use crate::scene::{Mesh, Scene};
 
 /// Format and bytes of the texels as which corners, faces and envelopes are read.
 const WORDS: (vk::Format, u64) = (vk::Format::R32G32B32A32_UINT, 16);
+/// The same for what trees hide of the sky.
+const PAIRS: (vk::Format, u64) = (vk::Format::R32G32_SFLOAT, 8);
 /// Bytes of a corner: its place and its texture coordinates.
 const CORNER_BYTES: u64 = 16;
 /// Texels along a side of a leaf mask, at most and at least.
@@ -25,7 +27,23 @@ pub fn leaf_masks<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> (u32, u32) {
     (side.next_power_of_two().min(most), sides.len() as u32)
 }
 
-/// 16-byte words of a triangle's envelope, eight half floats each.
+/// Mean side of the leaves of a scene's models at their smallest scale, m, of the model with the smallest. Leaves are mostly cards of two
+/// triangles: a leaf's side is that of a square of twice a triangle's area.
+pub(super) fn leaf_side(scene: &Scene) -> f64 {
+    let of = |mesh: &Mesh| -> f64 {
+        let any = mesh.materials.iter().any(|m| m.foliage);
+        let leaves = mesh.triangles.iter().filter(|t| !any || mesh.materials[t.material as usize].foliage);
+        let (sides, count) = leaves.fold((0.0, 0u32), |(sum, count), t| {
+            let [a, b, c] = t.vertices.map(|v| glam::Vec3::from(mesh.positions[v as usize]));
+            (sum + f64::from((b - a).cross(c - a).length()).sqrt(), count + 1)
+        });
+        sides / f64::from(count.max(1))
+    };
+    let sides = scene.species.iter().map(|s| of(&s.mesh) * f64::from(s.scale[0]));
+    sides.fold(f64::INFINITY, f64::min)
+}
+
+/// 16-byte words of a triangle's envelope for viewers above or below, eight half floats each.
 pub fn envelope_words(directions: u32) -> u32 {
     directions.div_ceil(8)
 }
@@ -44,9 +62,12 @@ impl Plan {
         );
         items.add("data", "meshes", reason, [corners, faces]);
         let directions = scene.settings.leaf_directions;
-        let envelopes = words(resource::ENVELOPES, triangles * 16 * u64::from(envelope_words(directions)));
+        let envelopes =
+            words(resource::ENVELOPES, 2 * triangles * 16 * u64::from(envelope_words(directions)));
         let reason = format!("how thick the crown around each leaf is in {directions} directions");
-        items.add("data", "leaf envelopes", reason, [envelopes]);
+        let pairs = u64::from(directions) * u64::from(HIDING_STEPS);
+        let hiding = BufferDesc { texels: Some(PAIRS), ..BufferDesc::new(resource::HIDING, pairs * PAIRS.1) };
+        items.add("data", "leaf envelopes", reason, [envelopes, hiding]);
         let (side, layers) = leaf_masks(scene.species.iter().map(|s| s.mesh.as_ref()));
         if layers > 0 {
             let image = ImageDesc {

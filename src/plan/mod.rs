@@ -95,6 +95,8 @@ pub struct Plan {
     pub mesh_range: Vec<f64>,
     /// Whether any tree can come within that of an eye.
     pub meshes: bool,
+    /// Mean side of a leaf of these, of the species with the smallest, m; 0 where none is a mesh.
+    pub leaf_side: f64,
     /// Whether light meets the average light that the pair tables hold (BN12, G and T): that of a sun, and where it
     /// converges at any distance that there is.
     pub pair_tables: bool,
@@ -213,6 +215,9 @@ impl Plan {
                 std::iter::once(&eye.position).chain(places).any(|p| plan.scene_in_range(scene, *p));
             plan.meshes = plan.z_fields
                 && std::iter::once(&eye.position).chain(places).any(|p| plan.scene_has_mesh_at(scene, *p));
+            if plan.meshes {
+                plan.leaf_side = meshes::leaf_side(scene);
+            }
             if plan.z_fields && plan.sun {
                 plan.transfer_bands = scene.settings.transfer_bands;
             }
@@ -246,6 +251,7 @@ impl Plan {
             z_fields: false,
             mesh_range: Vec::new(),
             meshes: false,
+            leaf_side: 0.0,
             pair_tables: false,
             transfer_bands: 0,
             cascades: if scene.sun.shines() { s.cascades } else { 0 },

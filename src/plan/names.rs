@@ -118,6 +118,8 @@ pub mod resource {
     pub const MESH_FACES: &str = "mesh faces";
     /// Crowns around the leaves of meshes.
     pub const ENVELOPES: &str = "leaf envelopes";
+    /// What trees hide of the sky from leaves of neighbours.
+    pub const HIDING: &str = "hidden sky";
     /// Where the meshes' materials are holes.
     pub const LEAF_MASKS: &str = "leaf masks";
     /// Draws of the meshes.

@@ -4,7 +4,9 @@ use crate::forest::cull::CullData;
 use crate::forest::meshes::MeshData;
 use crate::frame::Forest;
 use crate::frame::targets::ImageTargets;
-use crate::gpu::interface::{MESH_TREES, MeshDraw, MeshParameters, TILE_SIDE, TileParameters};
+use crate::gpu::interface::{
+    HIDING_STEPS, MESH_TREES, MeshDraw, MeshLightParameters, MeshParameters, TILE_SIDE,
+};
 use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, Later, Layers, Program, Recorder, Resource, Sampler,
     Targets, shaders, vk,
@@ -20,7 +22,7 @@ pub struct Meshes {
     draw: Program,
     light: Program,
     tiles: [u32; 2],
-    parameters: TileParameters,
+    size: [u32; 2],
 }
 
 impl Meshes {
@@ -56,7 +58,7 @@ impl Meshes {
                 ],
             )?,
             tiles: plan.size.map(|n| n.div_ceil(TILE_SIDE)),
-            parameters: TileParameters { size: plan.size, ..bytemuck::Zeroable::zeroed() },
+            size: plan.size,
         })
     }
 
@@ -121,6 +123,7 @@ impl Meshes {
                 ("faces", Resource::Texels(&data.faces)),
                 ("envelopes", Resource::Texels(&data.envelopes)),
                 ("rule", Resource::Buffer(&data.rule)),
+                ("hiding", Resource::Texels(&data.hiding)),
                 ("optics", Resource::Buffer(&data.optics)),
                 ("seen", Resource::Texels(seen)),
                 ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
@@ -128,7 +131,10 @@ impl Meshes {
                 ("quads_seen", Resource::Texture(quads_seen.drawn(), Sampler::Nearest)),
             ];
             pass.bind(&self.light, &[&all[..], &shown].concat());
-            pass.push(&self.parameters);
+            pass.push(&MeshLightParameters {
+                size: self.size,
+                heights: [data.top, HIDING_STEPS as f32 / data.top],
+            });
             pass.dispatch([self.tiles[1], self.tiles[0], 1]);
         });
     }

@@ -48,19 +48,22 @@ impl Directions {
         self.to.len()
     }
 
-    /// Mean of what is so of a direction of the sphere over each one's cell: over the directions that are nearest to it.
-    pub fn means(&self, of: impl Fn([f64; 3]) -> f64) -> Vec<f64> {
-        let (mut cells, n) = (vec![(0.0, 0.0); self.len()], 8192);
+    /// Of each direction's cell of the sphere, the directions that are nearest to it, what is above the horizon (or below it): the integral of its
+    /// unit vectors over the sphere's area, so that a surface of normal n faces it with n · that.
+    pub fn half(&self, above: bool) -> Vec<[f64; 3]> {
+        let (mut cells, n) = (vec![[0.0; 3]; self.len()], 8192);
         for k in 0..n {
             // Even over the sphere: equal steps of height, turned by the golden angle.
             let (z, angle) =
                 (1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(n), f64::from(k) * 2.399_963_229_728_653);
             let radius = (1.0 - z * z).sqrt();
             let w = [radius * angle.cos(), radius * angle.sin(), z];
-            let cell: &mut (f64, f64) = &mut cells[self.nearest(w)];
-            *cell = (cell.0 + of(w), cell.1 + 1.0);
+            if (z > 0.0) == above {
+                let cell: &mut [f64; 3] = &mut cells[self.nearest(w)];
+                cell.iter_mut().zip(w).for_each(|(sum, x)| *sum += x / f64::from(n));
+            }
         }
-        cells.into_iter().map(|(sum, count)| sum / f64::max(count, 1.0)).collect()
+        cells
     }
 
     /// Which is nearest to a direction.

@@ -27,6 +27,7 @@ layout(binding = 8) uniform usamplerBuffer envelopes;
 layout(std140, binding = 9) uniform Leaves { vec4 items[2u * 26u]; } rule;
 layout(std140, binding = 12) uniform Optics { vec4 items[3u * MAX_SPECIES]; } optics; // of each species: reflectance and transmittance of leaves, bark
 layout(binding = 13) uniform sampler2DArray shadow_map;
+layout(binding = 14) uniform samplerBuffer hiding;    // of each direction, HIDING_STEPS pairs
 #ifdef SINGLE
 layout(binding = 10) uniform sampler2DArray depth;
 layout(binding = 11) uniform usampler2DArray quads_seen;
@@ -34,34 +35,38 @@ layout(binding = 11) uniform usampler2DArray quads_seen;
 layout(binding = 10) uniform sampler2DMSArray depth;
 layout(binding = 11) uniform usampler2DMSArray quads_seen;
 #endif
-layout(push_constant) uniform Push { TileParameters p; };
+layout(push_constant) uniform Push { MeshLightParameters p; };
 layout(constant_id = 0) const uint SAMPLES = 4u;
 layout(constant_id = 1) const bool HAS_SUN = true;
 layout(constant_id = 2) const uint LEAF_DIRECTIONS = 26u;
 layout(constant_id = 3) const int LEAF_POWER = 6;
 
-// What the crown leaves of sky and sun at a triangle of unit normal n; all in the tree's own axes.
-LeafLight leaf_light(uint face, vec3 n, vec3 sun) {
+// What the crown leaves of sky and sun at a triangle of unit normal n, all in the tree's own axes; and of the sky, what the trees around leave
+// of thickness `around`, at a height above the ground in metres (src/bake/hiding.rs).
+LeafLight leaf_light(uint face, vec3 n, vec3 viewer, vec3 sun, float height, float around) {
     const uint words = (LEAF_DIRECTIONS + 7u) / 8u;
     LeafLight light = LeafLight(vec2(0.0), 0.0);
     vec2 sides = vec2(0.0);
-    float towards = 0.0;
+    float towards = 0.0, step = clamp(height, 0.0, 0.999 * p.heights.x) * p.heights.y;
     for (uint word = 0u; word < words; word++) {
-        uvec4 w = texelFetch(envelopes, int(face * words + word));
+        // Around what is seen of it from above, and from below.
+        uvec4 w = texelFetch(envelopes, int(2u * face * words + word)), u = texelFetch(envelopes, int((2u * face + 1u) * words + word));
         for (uint k = 0u; k < 8u && 8u * word + k < LEAF_DIRECTIONS; k++) {
-            uint pair = k < 2u ? w.x : k < 4u ? w.y : k < 6u ? w.z : w.w, at = 2u * (8u * word + k);
-            vec2 both = unpackHalf2x16(pair);
-            leaf_direction(light, sides, towards, rule.items[at], rule.items[at + 1u].x, (k & 1u) == 0u ? both.x : both.y, n, sun,
+            uvec2 pair = k < 2u ? uvec2(w.x, u.x) : k < 4u ? uvec2(w.y, u.y) : k < 6u ? uvec2(w.z, u.z) : uvec2(w.w, u.w);
+            uint at = 2u * (8u * word + k);
+            vec2 both = mix(unpackHalf2x16(pair.y), unpackHalf2x16(pair.x), 0.5 + 0.5 * viewer.z), hides = texelFetch(hiding, int((8u * word + k) * HIDING_STEPS) + int(step)).xy;
+            float others = exp(-around * (hides.x + fract(step) * hides.y));
+            leaf_direction(light, sides, towards, rule.items[at], rule.items[at + 1u].xyz, others, (k & 1u) == 0u ? both.x : both.y, n, sun,
                            LEAF_POWER);
         }
     }
-    light.sky /= max(sides, 1e-6);
-    light.sun /= max(towards, 1e-6);
-    return light;
+    return leaf_means(light, sides, towards, n);
 }
 
-// What shadow maps leave of the sun at a place, that of its own tree left out.
-float others_leave(Tree t, Species kind, vec3 world) {
+// What is left of the sun at a place of unit normal n, of which `own` is what its own crown leaves on average. Each tree's shadow counts once:
+// a cascade into which meshes cast tells single leaves apart, and knows its own tree's as well; another knows the other trees, by their
+// z-fields, and the envelope is the own tree's shadow.
+float sun_left(Tree t, Species kind, vec3 world, vec3 n, float own) {
     View v = view.v;
     uint cascade = min(cascade_of(t), MAX_CASCADES - 1u);
     mat4 shadow = v.cascade_from_world[0];
@@ -72,10 +77,14 @@ float others_leave(Tree t, Species kind, vec3 world) {
     }
     vec3 at = (shadow * vec4(world, 1.0)).xyz;
     float deeper = (shadow * vec4(v.sun_direction, 0.0)).z;
+    // Half a texel towards the sun, so that nothing shades itself.
     at.z += 0.5 * v.cascade_texel[cascade] * deeper;
+    bool leaves = cascade_of(t) < v.mesh_cascades;
     float reach = 4.0 * kind.scale_to_metres.z * t.scale * deeper;
-    float visible = sun_visibility(shadow_map, at, vec2(0.0), turn, cascade, caster_name(t.identity), reach);
-    return cascade_of(t) < MAX_CASCADES ? visible : 1.0;
+    vec3 facing = dot(n, v.sun_direction) < 0.0 ? -n : n;
+    vec2 gradient = leaves ? plane_gradient(facing, v.cascade_x, v.cascade_y, v.sun_direction) : vec2(0.0);
+    float visible = sun_visibility(shadow_map, at, gradient, turn, cascade, leaves ? NO_TREE : caster_name(t.identity), leaves ? 0.0 : reach);
+    return (leaves ? 1.0 : own) * (cascade_of(t) < MAX_CASCADES ? visible : 1.0);
 }
 
 // What a triangle shows to a pixel, at a place of the world from the camera.
@@ -91,16 +100,15 @@ Shown shade(uint what, vec3 world) {
     // Bark has one side, that which is seen.
     if (!leaf && dot(n, viewer) < 0.0) n = -n;
     vec3 reflectance = optics.items[3u * t.species + (leaf ? 0u : 2u)].rgb, transmittance = leaf ? optics.items[3u * t.species + 1u].rgb : vec3(0.0);
-    LeafLight light = leaf_light(face, n, sun);
-    // What slope and neighbours leave of the sky, times its radiance and the tint: the same as for the tree's z-field.
     vec2 hole = unpackHalf2x16(t.hole_change), own = unpackHalf2x16(t.own_lit), lit = unpackHalf2x16(t.mean_lit_change);
-    float height = (back * (world - t.centre)).z / (kind.scale_to_metres.z * t.scale);
-    vec3 sky = t.sky / max(0.5 * kind.albedo, 1e-6) * hole_occlusion(max(1.0 - height, 0.0) * kind.scale_to_metres.z * t.scale, hole.x);
+    float metres = (back * (world - t.centre)).z + kind.centre * t.scale;
+    LeafLight light = leaf_light(face, n, viewer, sun, metres, hole.x / max(kind.hole, 1e-9) * kind.mean_area);
+    vec3 sky = tint_of(t) * view.v.sky_radiance;
     vec3 sky_part = own.x * leaf_sky(reflectance, transmittance, n, viewer, light.sky) * sky + t.mean_sky;
     vec3 sun_part = t.mean_sun;
     float lit_part = 0.0;
     if (HAS_SUN) {
-        float visible = light.sun * others_leave(t, kind, world);
+        float visible = sun_left(t, kind, world, rotated(t.turn, n), light.sun);
         lit_part = own.x * visible + lit.x;
         sun_part += (own.x * visible * tint_of(t)) * leaf_sun(reflectance, transmittance, n, viewer, sun) * v.sun_irradiance;
     }
