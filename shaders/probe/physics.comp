@@ -51,6 +51,7 @@ void main() {
         case 5u: r.a.x = floatBitsToUint(ground_contrast(a.x, a.y, a.z)); break;
         case 6u: r.a.x = covered_samples(a.x, a.y, i.a.z); break;
         case 7u: r.a.x = mask_column(i.a.xyz, i.b.x, i.b.y); break;
+        case 17u: r.a.xy = uvec2(mesh_mask(i.a.y, i.a.z, i.a.w), rest_mask(i.a.x, i.a.y, i.a.z, i.a.w)); break;
         case 8u: {
             vec2 gradient = plane_gradient(a.xyz, b.xyz, c.xyz, vec3(a.w, b.w, c.w));
             r.a.xy = floatBitsToUint(gradient);

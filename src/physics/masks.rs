@@ -9,6 +9,24 @@ pub fn covered_samples(alpha: f32, dither: f32, samples: u32) -> u32 {
     (alpha * samples as f32 + dither).floor().clamp(0.0, samples as f32) as u32
 }
 
+/// So many samples in turn from one on, around the end.
+pub fn run_mask(count: u32, first: u32, samples: u32) -> u32 {
+    let run = (1u32 << count) - 1;
+    (run << first | run >> (samples - first)) & ((1 << samples) - 1)
+}
+
+/// The samples in which a tree is its mesh: so many from one on that the lower bits of its dither choose.
+pub fn mesh_mask(count: u32, dither_bits: u32, samples: u32) -> u32 {
+    run_mask(count, dither_bits & (samples - 1), samples)
+}
+
+/// Samples that its z-field covers: so many of those that the mesh leaves.
+pub fn rest_mask(covered: u32, count: u32, dither_bits: u32, samples: u32) -> u32 {
+    let (rest, first) = ((samples - count).max(1), ((dither_bits & (samples - 1)) + count) & (samples - 1));
+    let some = run_mask(covered.min(rest), (dither_bits >> 3) % rest, rest);
+    (some << first | some >> (samples - first)) & ((1 << samples) - 1)
+}
+
 /// A tree's row of the combination table, packed as the shaders take it: column k holds a mask with k bits set.
 pub type Row = [u32; 4];
 
@@ -67,6 +85,38 @@ mod tests {
         }
         assert_eq!(combination_table(4).len(), 12);
         assert_eq!(combination_table(8).len(), 280);
+    }
+
+    #[test]
+    fn mesh_and_z_field_part_a_pixels_samples() {
+        for samples in [1, 4, 8] {
+            for count in 0..=samples {
+                let mut seen = vec![[0u32; 2]; samples as usize];
+                for bits in 0..1024 {
+                    let mesh = mesh_mask(count, bits, samples);
+                    assert_eq!(mesh.count_ones(), count);
+                    let all = rest_mask(samples - count, count, bits, samples);
+                    assert_eq!((mesh | all, mesh & all), ((1 << samples) - 1, 0), "{samples} {count} {bits}");
+                    for covered in 0..=samples - count {
+                        let rest = rest_mask(covered, count, bits, samples);
+                        assert_eq!(
+                            (rest.count_ones(), rest & mesh),
+                            (covered, 0),
+                            "{samples} {count} {bits}"
+                        );
+                    }
+                    let one = if count < samples { rest_mask(1, count, bits, samples) } else { 0 };
+                    for (k, seen) in seen.iter_mut().enumerate() {
+                        *seen = [seen[0] + (mesh >> k & 1), seen[1] + (one >> k & 1)];
+                    }
+                }
+                // Any sample is as likely as any other, to within what 128 remainders by 3, 5, 6 or 7 leave.
+                let even = |k: usize| {
+                    seen.iter().map(|s| s[k]).max().unwrap() - seen.iter().map(|s| s[k]).min().unwrap()
+                };
+                assert!(even(0) == 0 && even(1) <= 16, "{samples} {count}: {seen:?}");
+            }
+        }
     }
 
     #[test]

@@ -33,6 +33,7 @@ pub enum Function {
     TableCoordinates,
     SelfShadow,
     Transfer,
+    MeshMask,
 }
 
 /// The results of a function for many arguments.

@@ -128,7 +128,8 @@ uint sees(Sight s, vec2 pixel, out float depth) {
     float along = clamp(surface.s, -1e3, 0.999);
     float opacity = surface.s < 0.999 && inverse_h > 0.0 ? surface.opacity * s.fade : 0.0;
     depth = min(p.near / s.depth * inverse_h / (1.0 - along), 1.0);
-    uint covered = covered_samples(opacity, s.dither, SAMPLES), mask = inner_column(s.row, covered, SAMPLES);
+    uint covered = covered_samples(opacity, s.dither, SAMPLES - s.mesh), mask = inner_column(s.row, covered, SAMPLES);
+    if (s.mesh > 0u) mask = rest_mask(covered, s.mesh, uint(s.dither * 1024.0), SAMPLES);
     // The quad's edges part samples, as those of triangles do.
     uint within = 0u;
     for (uint k = 0u; k < SAMPLES; k++) {
@@ -137,7 +138,7 @@ uint sees(Sight s, vec2 pixel, out float depth) {
         bool inside = c.x >= s.extent.x && c.x <= s.extent.y && c.y >= s.extent.z && c.y <= s.extent.w;
         within |= inside ? 1u << k : 0u;
     }
-    return mask & within & ~mesh_mask(s.mesh, uint(s.dither * 1024.0), SAMPLES);
+    return mask & within;
 }
 
 // A pixel's way through its trees.
