@@ -57,7 +57,7 @@ uint lookup(vec3 w, out vec2 weights) {
 // lit.
 float average_light(inout Tree t, Species kind, TableSlope slope, vec3 ground, float x, float nu) {
     TableForest f = table_forest(pair_table, view_table, slope, x, TableKnown(x, x, x, x, x), kind.max_thickness, float(t.species),
-                                 TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES, false);
+                                 TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES, false, 1.0);
     float lit = nu * sun_facing(view.v.sun_direction, ground);
     t.mean_sun = (lit * f.transfer) * t.sun * (f.sun.x + f.sun.y * kind.bark_ratio);
     t.mean_sky = nu * t.sky * (f.sky.x + f.sky.y * kind.bark_ratio);

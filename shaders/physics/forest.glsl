@@ -62,8 +62,9 @@ float grown_path(float full, float alone, float beyond) { return full + beyond *
 // Trees of optical thickness x (density times area). The tables are of level ground, which a shear makes of a slope. It leaves how
 // trees stand to each other, and changes crowns: what one crown by itself is to v and l, at density 0, is put in place of what the
 // shear makes of it, and so do the paths through the crowns before it. Nothing changes on level ground.
+// `past`: through what part of the crowns' depth the ground is seen, 1 from above them.
 TableForest table_forest(sampler3D pairs, sampler2DArray views, TableSlope t, float x, TableKnown known, float x_max,
-                         float species, float count, float m, bool lit, bool mixed) {
+                         float species, float count, float m, bool lit, bool mixed, float past) {
     float at_sky = table_density(known.sky, x_max, m), at_seen = table_density(known.seen, x_max, m);
     float at_discs = table_density(known.discs, x_max, m);
     vec3 at_s = table_coordinates(t.s, count), at_u = table_coordinates(t.u, count);
@@ -74,11 +75,14 @@ TableForest table_forest(sampler3D pairs, sampler2DArray views, TableSlope t, fl
     TableForest f;
     f.seen = x * t.s.sec_v * grown_path(path, vs.x, table_beyond(known.seen, x_max)) * t.view_path;
     f.joint = f.seen;
-    f.coverage = coverage;
     // Of as many trees as stand on a metre of the slope: about its normal that is level ground.
     float at_steep = table_density(known.sky * t.up, x_max, m);
-    f.ground.x = table_ground(views, at_s.z, at_steep, species, count, m).x;
+    // Of ground that the viewer sees past the crowns before it: where he stands among or under them there is less to see it past, and what he
+    // sees is nearer to all ground.
+    vec4 steep = table_ground(views, at_s.z, at_steep, species, count, m);
+    f.ground.x = exp(mix(log(max(steep.w, 1e-6)), log(max(steep.x, 1e-6)), past));
     f.ground.y = table_ground(views, at_s.z, at_discs, species, count, m).y;
+    f.coverage = mix(f.ground.y, coverage, past);
     f.transfer = 1.0;
     f.sun = vec2(0.0);
     f.sky = full.yz * ((vu.y + vu.z) / max(vs.y + vs.z, 1e-3));

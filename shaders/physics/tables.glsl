@@ -74,10 +74,10 @@ vec4 table_view(sampler2DArray views, float at_v, float density, float species, 
     return textureLod(views, vec3((at_v + 0.5) / (2.0 * n), (density + 0.5) / m, species), 0.0);
 }
 
-// (D_v, C, s): sky visibility of the ground that is seen, expected coverage by discs, and s of near trees' sky, from columns n to
-// 2 n - 1.
-vec3 table_ground(sampler2DArray views, float at_v, float density, float species, float n, float m) {
-    return textureLod(views, vec3((n + at_v + 0.5) / (2.0 * n), (density + 0.5) / m, species), 0.0).xyz;
+// (D_v, C, s, D): sky visibility of the ground that is seen, expected coverage by discs, s of near trees' sky, and sky visibility of all
+// ground, from columns n to 2 n - 1.
+vec4 table_ground(sampler2DArray views, float at_v, float density, float species, float n, float m) {
+    return textureLod(views, vec3((n + at_v + 0.5) / (2.0 * n), (density + 0.5) / m, species), 0.0);
 }
 
 // Mean of exp(-x t) over t in [0, 1].

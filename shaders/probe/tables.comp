@@ -29,5 +29,5 @@ void main() {
     float species = places.items[k].species.x;
     results.items[k] = Values(table_pair(pair_table, at.xyz, at.w, species, TABLE_ANGLES, TABLE_DENSITIES),
                               table_view(view_table, at.z, at.w, species, TABLE_ANGLES, TABLE_DENSITIES),
-                              vec4(table_ground(view_table, at.z, at.w, species, TABLE_ANGLES, TABLE_DENSITIES), 0.0));
+                              table_ground(view_table, at.z, at.w, species, TABLE_ANGLES, TABLE_DENSITIES));
 }

@@ -12,7 +12,7 @@ use crate::{Error, Result};
 pub struct TableData {
     /// (W, T of leaves, T of bark, M): azimuth, light zenith, then view zenith within density within species.
     pub pairs: Image,
-    /// (V, E of leaves, E of bark, coverage at visible ground) by view zenith and density, and beside them (D_v, C, s); a layer a
+    /// (V, E of leaves, E of bark, coverage at visible ground) by view zenith and density, and beside them (D_v, C, s, D); a layer a
     /// species.
     pub views: Image,
     /// Nodes of each angle.
@@ -57,9 +57,9 @@ impl TableData {
         for t in tables {
             let n = n as usize;
             let skies = t.seen_sky.chunks_exact(n).zip(t.near_sky.chunks_exact(n));
-            for ((row, (seen, near)), [_, c]) in t.view.chunks_exact(n).zip(skies).zip(&t.ground) {
+            for ((row, (seen, near)), [sky, c]) in t.view.chunks_exact(n).zip(skies).zip(&t.ground) {
                 texels.extend(row.iter().flatten().map(|v| half(*v)));
-                texels.extend(seen.iter().zip(near).flat_map(|(d, s)| [half(*d), half(*c), half(*s), 0]));
+                texels.extend(seen.iter().zip(near).flat_map(|(d, s)| [d, c, s, sky].map(|v| half(*v))));
             }
         }
         gpu.upload_image(&views, 0, 0, count, bytemuck::cast_slice(&texels))?;

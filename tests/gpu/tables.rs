@@ -236,7 +236,12 @@ fn lookups_are_those_of_the_oracle_within_half_floats_and_filters() {
             let (p, w, g) = (
                 tables::pair(t, v, l, phi, x),
                 tables::view(t, v, x),
-                [tables::seen_sky(t, v, x), tables::ground(t, x)[1], tables::near_sky(t, v, x)],
+                [
+                    tables::seen_sky(t, v, x),
+                    tables::ground(t, x)[1],
+                    tables::near_sky(t, v, x),
+                    tables::ground(t, x)[0],
+                ],
             );
             let wants = p.iter().zip(&pair).chain(w.iter().zip(&view)).chain(g.iter().zip(&ground));
             for (want, got) in wants {

@@ -67,14 +67,16 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
             vec2 above = strata_seen[k].above / max(through.yz * above_one_layer(through.x), 1e-6);
             known = TableKnown(all.x / alone[k].x + own, joint, joint * above.x, through.z / s.sky_path * above.y, all.z + own);
         }
+        // The eye above the ground of the place, of the depth of the crowns.
+        vec2 depth = crowns_of(s);
+        float past = clamp((v.z * distance - (depth.x - depth.y)) / max(2.0 * depth.y, 1e-3), 0.0, 1.0);
         TableForest t = table_forest(pair_table, view_table, slope_of(v, n, k), total, known, s.max_thickness, float(k),
-                                     TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES, mixed);
+                                     TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES, mixed, past);
         float path = share * t.seen, relative = relative_distance(distance, s.range), part = path * handed_over(relative);
         f.seen += path;
         f.over += part;
-        vec2 crowns = crowns_of(s);
-        f.middle += path * crowns.x;
-        f.half_depth += path * crowns.y;
+        f.middle += path * depth.x;
+        f.half_depth += path * depth.y;
         f.converged += path * converged(relative, view.v.convergence);
         f.seen_coverage += share * t.coverage;
         // As many trees as stand on a metre of the slope.
