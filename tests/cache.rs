@@ -212,7 +212,7 @@ fn of_scene(scene: &Scene, needs: Needs, dir: &Path) -> (Baked, BakedFrom) {
 }
 
 fn from(views: CacheState, transfer: Option<CacheState>, tables: CacheState) -> BakedFrom {
-    BakedFrom { views, transfer, tables }
+    BakedFrom { views, transfer, tables, envelopes: None }
 }
 
 /// Baked once with all.
@@ -305,7 +305,7 @@ fn what_a_plan_does_not_need_is_not_baked() {
     assert_eq!(without(|s| s.sun.irradiance = [0.0; 3]), average);
     assert_eq!(without(|s| s.cameras[0].position[2] = 1e5), average);
     let bare = without(|s| s.species.clear());
-    assert_eq!(bare, Needs { trees: false, transfer: false });
+    assert_eq!(bare, Needs { trees: false, transfer: false, envelopes: false });
 
     let dir = tempfile::tempdir().unwrap();
     assert!(load_or_bake_scene(&scene, bare, Some(dir.path()), true).unwrap().is_empty());
