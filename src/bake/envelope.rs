@@ -211,8 +211,8 @@ fn thickness(
             let cell = &mut cells[cell];
             cell.all += 1;
             cell.open += leaves;
-            for viewer in 0..2 {
-                let others = open[viewer] - if viewer == side { leaves } else { 0 };
+            for (viewer, open) in open.into_iter().enumerate() {
+                let others = open - if viewer == side { leaves } else { 0 };
                 cell.weight[viewer] += others;
                 cell.weighted[viewer] += others * leaves;
             }
