@@ -2,7 +2,7 @@
 //!
 //! BBP08 multiply the solid angles of neighbour leaves sorted by distance, all as if they were seen from the front. Here rays are cast at
 //! the mesh, through leaf masks, bark included: the share of rays of a direction's cell of the sphere that leave the tree is e^(−t), and t the
-//! optical thickness. A leaf does not hide itself. Of a leaf places count as they are seen ([`thickness`]). A cell that no ray leaves has the
+//! optical thickness. A leaf does not hide itself. Of a leaf places count as they are seen. A cell that no ray leaves has the
 //! thickness of half a ray. Bark has envelopes as well, patch by patch, for the sky's light on it; what light leaves hand to each other knows
 //! leaves alone.
 
