@@ -73,7 +73,7 @@ struct Species {
     vec3 reflectance;                 // of the crown's leaves and twigs, at phase angle 0
     float extinction;                 // tau of the crown's self-shadow, 1/(m rad)
     vec3 transmittance;               // of the crown's leaves
-    float mesh_range;                 // distance to which trees are their model's mesh, m; 0: none is
+    float mesh_range;                 // distance to which trees are their model's mesh, times their scale, m; 0: none is
     float range;                      // s_max: distance to which trees are drawn one by one, m; 0: none is
     float crown_radius;               // sqrt(A / pi), m
     float bounding_radius;            // of a sphere about o, m

@@ -132,16 +132,17 @@ impl Settings {
         };
         if !value.is_finite() || value < knob.min || value > knob.max || !whole || !power || !one_of {
             let kind = match name {
-                "samples" => "1, 4 or 8, ",
-                "leaf_directions" => "8, 14 or 26, ",
                 _ if !power || name.ends_with("_size") || name == "view_resolution" => "a power of two, ",
                 _ if knob.whole => "a whole number, ",
                 _ => "",
             };
-            return Err(Error::Usage(format!(
-                "knob \"{name}\" is {value}; it takes {kind}{} to {} {}",
-                knob.min, knob.max, knob.unit
-            )));
+            let range = format!("{kind}{} to {} {}", knob.min, knob.max, knob.unit);
+            let takes = match name {
+                "samples" => "1, 4 or 8",
+                "leaf_directions" => "8, 14 or 26",
+                _ => range.trim_end(),
+            };
+            return Err(Error::Usage(format!("knob \"{name}\" is {value}; it takes {takes}")));
         }
         self.write(name, value);
         Ok(())

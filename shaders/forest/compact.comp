@@ -125,7 +125,8 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     t.sky *= table_ground(view_table, table_zenith(slope.u.v, TABLE_ANGLES), table_density(thickness, kind.max_thickness, TABLE_DENSITIES),
                           species, TABLE_ANGLES, TABLE_DENSITIES).z;
     // Rounded as opacities are, once a tree.
-    float mesh = kind.mesh_range > 0.0 ? tree_fade(distance / kind.mesh_range, unit(hash(s.identity ^ HASH_FADE))) : 0.0;
+    float mesh_range = kind.mesh_range * s.scale;
+    float mesh = mesh_range > 0.0 ? tree_fade(distance / mesh_range, unit(hash(s.identity ^ HASH_FADE))) : 0.0;
     uint samples = covered_samples(mesh, unit(hash(s.identity ^ HASH_MESH)), SAMPLES);
     t.cascade_tint = cascade_at(v.cascade_far, v.cascade_count, distance) | samples << 8u | packHalf2x16(vec2(0.0, tint));
     return t;

@@ -27,7 +27,7 @@ use crate::scene::{Mesh, OpticsOverride};
 
 const VIEWS: Format = Format { magic: *b"CANOPYZF", version: 14, extension: "zfield" };
 const TRANSFER: Format = Format { magic: *b"CANOPYLT", version: 4, extension: "transfer" };
-const ENVELOPES: Format = Format { magic: *b"CANOPYLE", version: 4, extension: "envelopes" };
+const ENVELOPES: Format = Format { magic: *b"CANOPYLE", version: 5, extension: "envelopes" };
 /// Numbers at the head of a file of views.
 const SCALARS: usize = 23 + 4 * TERMS;
 

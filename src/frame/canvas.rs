@@ -136,7 +136,7 @@ impl Canvas {
         let meshes = passes.meshes.as_ref().zip(world.meshes());
         passes.ground.see(r, view, indices, ground, &self.targets);
         if let Some((pass, (_, cull, data))) = meshes {
-            pass.see(r, view, (cull, data, plan.last_mesh_range()), &self.targets);
+            pass.see(r, view, (cull, data, plan.last_mesh_range), &self.targets);
         }
         if let Some((horizon, far)) = passes.horizon.as_ref().zip(forest) {
             if streamed.far_trees {

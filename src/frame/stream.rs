@@ -111,7 +111,7 @@ impl World {
             return Err(Error::Usage(format!(
                 "trees are within {:.0} m of this camera, where they are meshes, and the plan was made where none are: plan again for \
                  this camera",
-                plan.last_mesh_range()
+                plan.last_mesh_range
             )));
         }
         if !plan.trees_within(extent, heights, eye.position) {

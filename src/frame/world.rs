@@ -233,6 +233,7 @@ pub(super) fn served(scene: &Scene, held: &Plan, wanted: &Plan) -> Result<Plan> 
         shadow_distance: wanted.shadow_distance,
         species_range: wanted.species_range.clone(),
         mesh_range: wanted.mesh_range.clone(),
+        last_mesh_range: wanted.last_mesh_range,
         range: wanted.range,
         silhouette_ratio: wanted.silhouette_ratio,
         draw_limits: wanted.draw_limits,

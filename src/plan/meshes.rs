@@ -58,7 +58,7 @@ impl Plan {
         let reason = format!(
             "{} models, whose triangles are drawn to {:.0} m",
             scene.species.len(),
-            self.last_mesh_range()
+            self.last_mesh_range
         );
         items.add("data", "meshes", reason, [corners, faces]);
         let directions = scene.settings.leaf_directions;

@@ -91,8 +91,10 @@ pub struct Plan {
     pub forest: bool,
     /// Whether trees are drawn one by one: any can come within the range of an eye. Without, the shader-map shows all.
     pub z_fields: bool,
-    /// Distance to which trees of each species are their models' meshes, m: 0 where none is.
+    /// Distance to which trees of each species are their models' meshes, m, times their scale: 0 where none is.
     pub mesh_range: Vec<f64>,
+    /// The same of the largest tree of any, m.
+    pub last_mesh_range: f64,
     /// Whether any tree can come within that of an eye.
     pub meshes: bool,
     /// Mean side of a leaf of these, of the species with the smallest, m; 0 where none is a mesh.
@@ -250,6 +252,7 @@ impl Plan {
             forest: false,
             z_fields: false,
             mesh_range: Vec::new(),
+            last_mesh_range: 0.0,
             meshes: false,
             leaf_side: 0.0,
             pair_tables: false,

@@ -2,7 +2,7 @@
 
 use super::Plan;
 use crate::camera::Eye;
-use crate::scene::{Distribution, Scene};
+use crate::scene::{Distribution, Scene, Species};
 
 impl Plan {
     /// The range of every species and of all, the size of trees, and where they are drawn in another way.
@@ -10,11 +10,7 @@ impl Plan {
         let s = &scene.settings;
         self.forest = tree_density(scene) > 0.0;
         for species in &scene.species {
-            let mut scale = f64::from(species.scale[1]);
-            if let Distribution::Positions(list) = &species.distribution {
-                let largest = list.iter().filter_map(|p| p.scale).fold(0.0, f32::max);
-                scale = scale.max(f64::from(largest));
-            }
+            let scale = largest_scale(species);
             let reach = species.mesh.positions.iter().map(|p| p[0].hypot(p[1]).max(p[2])).fold(0.0, f32::max);
             self.tallest = self.tallest.max(f64::from(reach) * scale);
         }
@@ -23,7 +19,9 @@ impl Plan {
             let height = species.mesh.positions.iter().map(|p| p[2]).fold(0.0, f32::max).max(1e-3);
             let range = self.ladder.range(s, f64::from(height) * eye.pixels_at_1m, farthest);
             self.species_range.push(range);
-            self.mesh_range.push(self.ladder.mesh_range(s, f64::from(height) * eye.pixels_at_1m));
+            let mesh = self.ladder.mesh_range(s, f64::from(height) * eye.pixels_at_1m);
+            self.mesh_range.push(mesh);
+            self.last_mesh_range = self.last_mesh_range.max(mesh * largest_scale(species));
             self.range = self.range.max(range);
         }
         if self.ladder.averages() {
@@ -89,12 +87,7 @@ impl Plan {
 
     /// Whether any tree on ground of this extent between two heights may be so near a place that it is its model's mesh.
     pub fn mesh_in_range(&self, extent: [f64; 2], ground: [f64; 2], place: [f64; 3]) -> bool {
-        self.trees_within_of(self.last_mesh_range(), extent, ground, place)
-    }
-
-    /// Distance to which any tree is its model's mesh, m.
-    pub fn last_mesh_range(&self) -> f64 {
-        self.mesh_range.iter().copied().fold(0.0, f64::max)
+        self.trees_within_of(self.last_mesh_range, extent, ground, place)
     }
 
     /// Whether a tree of a range may be within it from a place.
@@ -127,6 +120,15 @@ impl Plan {
     pub(super) fn scene_has_mesh_at(&self, scene: &Scene, place: [f64; 3]) -> bool {
         near_ground(scene, place, |extent, ground| self.mesh_in_range(extent, ground, place))
     }
+}
+
+/// The largest scale that a tree of a species has.
+fn largest_scale(species: &Species) -> f64 {
+    let listed = match &species.distribution {
+        Distribution::Positions(list) => list.iter().filter_map(|p| p.scale).fold(0.0, f32::max),
+        Distribution::Density { .. } => 0.0,
+    };
+    f64::from(species.scale[1].max(listed))
 }
 
 /// Whether something is so of the ground nearest to a place, or of all ground: its extent and two heights.

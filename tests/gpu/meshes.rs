@@ -195,6 +195,18 @@ fn eyes_in_crowns_tiny_and_giant_trees_and_no_sun_are_drawn() {
 }
 
 #[test]
+fn a_tree_is_a_mesh_as_long_as_it_is_as_high_as_the_ladder_says() {
+    let gpu = device::open();
+    // Of the same species, of one fifth, once and four times the size: 60 m away they are about 4, 20 and 80 pixels high.
+    let scene = oaks(&[[44.0, 90.0, 0.2], [50.0, 90.0, 1.0], [56.0, 90.0, 4.0]], DAY);
+    let camera = device::camera([50.0, 30.0, 10.0], [50.0, 90.0, 10.0]);
+    let meshes = |by: &str| draw(&gpu, &scene, &camera, by).0.trees.meshes;
+    let by = ["mesh:16,zfield:4,shader-map", "mesh:40,zfield:4,shader-map", "mesh:200,zfield:4,shader-map"];
+    assert_eq!(by.map(meshes), [2, 1, 0]);
+    gpu.close().unwrap();
+}
+
+#[test]
 fn frames_of_meshes_are_the_same_bits_whatever_came_before() {
     let gpu = device::open();
     let places: Vec<[f64; 3]> =

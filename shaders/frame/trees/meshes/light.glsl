@@ -109,7 +109,7 @@ Shown shade(uint what, vec3 world) {
     float lit_part = 0.0;
     if (HAS_SUN) {
         float visible = sun_left(t, kind, world, rotated(t.turn, n), light.sun);
-        lit_part = own.x * visible + lit.x;
+        lit_part = min(own.x * visible + lit.x, 1.0);
         sun_part += (own.x * visible * tint_of(t)) * leaf_sun(reflectance, transmittance, n, viewer, sun) * v.sun_irradiance;
     }
 #ifdef LAYERS
