@@ -231,7 +231,7 @@ fn a_ladder_is_the_scenes_or_the_one_that_is_given() {
     let quiet = ["--quiet", "--json"];
     for command in ["render", "bench", "plan", "reflectance"] {
         for (args, hint) in [
-            (&["--ladder", "mesh:256,zfield:4,shader-map"][..], "the rungs are: zfield, shader-map"),
+            (&["--ladder", "cards:256,zfield:4,shader-map"][..], "the rungs are: mesh, zfield, shader-map"),
             (&["--ladder", "zfield:4"], "the last rung goes on to the horizon"),
             (&["--ladder", "shader-map,zfield"], "near to far"),
             (&["--ladder", "zfield,shader-map", "--representation", "auto"], "cannot be used with"),
@@ -242,7 +242,7 @@ fn a_ladder_is_the_scenes_or_the_one_that_is_given() {
     }
     let folder = dir.path().join("s").display().to_string();
     let text = refused(2, &["sweep", &file, "-o", &folder, "--ladder", "shells"]);
-    assert!(text.contains("the rungs are: zfield, shader-map"), "{text}");
+    assert!(text.contains("the rungs are: mesh, zfield, shader-map"), "{text}");
 }
 
 #[test]
@@ -516,7 +516,7 @@ fn reflectance_refuses_what_cannot_be_measured() {
         (&["--density", "0"], "--density"),
         (&["--density", "nan"], "--density"),
         (&["--representation", "mesh"], "shader-map"),
-        (&["--ladder", "mesh"], "the rungs are: zfield, shader-map"),
+        (&["--ladder", "mesh"], "write mesh:256,zfield:4,shader-map"),
         (&["--patches", "0"], "--patches"),
         (&["--patch-side", "1000"], "--patch-side 1000"),
         (&["--patch-side", "nan"], "--patch-side"),

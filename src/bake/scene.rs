@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::envelope::Envelopes;
 use super::{CacheState, ForestSettings, Source, SpeciesBake};
 use crate::Result;
+use crate::ladder::Ladder;
 use crate::physics::tables::ForestTables;
 use crate::plan::Plan;
 use crate::scene::{Distribution, Scene};
@@ -51,6 +52,11 @@ pub struct Needs {
 impl Needs {
     /// All but what meshes take, for whoever draws by several plans.
     pub const ALL: Needs = Needs { trees: true, transfer: true, envelopes: false };
+
+    /// All that plans of these ladders may need.
+    pub fn of(ladders: impl IntoIterator<Item = Ladder>) -> Self {
+        Needs { envelopes: ladders.into_iter().any(|l| l.meshes()), ..Needs::ALL }
+    }
 }
 
 impl From<&Plan> for Needs {

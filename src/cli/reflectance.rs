@@ -247,7 +247,9 @@ fn all(args: &Args, scene: &Scene, camera: &Camera, densities: &[f64]) -> Result
     let renders = settings.iter().any(|s| s.drawn != Drawn::Reference);
     // Before the progress bar: baking has its own.
     let baked: Vec<Baked> = if renders {
-        let found = load_or_bake_scene(scene, Needs::ALL, cache::default_dir().as_deref(), args.print.quiet)?;
+        let ladders = settings.iter().filter_map(|s| if let Drawn::By(l) = s.drawn { Some(l) } else { None });
+        let found =
+            load_or_bake_scene(scene, Needs::of(ladders), cache::default_dir().as_deref(), args.print.quiet)?;
         found.into_iter().map(|(b, _)| b).collect()
     } else {
         Vec::new()

@@ -241,8 +241,12 @@ impl<'a> Work<'a> {
         if wanted.is_empty() {
             return Ok(0);
         }
-        let baked =
-            load_or_bake_scene(&self.patch, Needs::ALL, cache::default_dir().as_deref(), self.request.quiet)?;
+        let baked = load_or_bake_scene(
+            &self.patch,
+            Needs::of(wanted.iter().map(|f| f.ladder)),
+            cache::default_dir().as_deref(),
+            self.request.quiet,
+        )?;
         let baked: Vec<Baked> = baked.into_iter().map(|b| b.0).collect();
         let camera = self.scene.camera(None)?;
         for from in &wanted {
