@@ -40,8 +40,9 @@ pub const PRESETS: [&str; 3] = ["fast", "balanced", "accurate"];
 
 macro_rules! knobs {
     ($($field:ident: $ty:tt, $unit:literal, $min:literal..=$max:literal, [$f:literal, $b:literal, $a:literal], $cost:ident [$($try:literal),*], $help:literal;)*) => {
-        /// The value of every knob.
+        /// The value of every knob. What was measured before there was a knob says nothing of it, and has it at its default.
         #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(default)]
         pub struct Settings { $(#[doc = $help] pub $field: $ty,)* }
 
         /// Every knob, in the order of printing.
