@@ -5,23 +5,12 @@
 #include "frame/tile.glsl"
 #include "frame/forest_node.glsl"
 #include "frame/shown.glsl"
-#include "frame/trees/meshes/seen.glsl"
+#include "frame/surfaces_seen.glsl"
 
 layout(binding = 1) uniform usamplerBuffer quads;   // of three texels
 layout(binding = 7) uniform samplerBuffer nodes;    // of four texels
-#ifdef SINGLE
-layout(binding = 10) uniform sampler2DArray depth;
-layout(binding = 11) uniform usampler2DArray quads_seen;
-#else
-layout(binding = 10) uniform sampler2DMSArray depth;
-layout(binding = 11) uniform usampler2DMSArray quads_seen;
-#endif
 layout(constant_id = 2) const uint SAMPLES = 4u;
 layout(constant_id = 4) const bool SKY_DRAWN = false; // in the picture already, as if all samples saw it
-
-// Of one sample a pixel there is level 0 alone.
-float ground_depth(ivec2 pixel, int k) { return texelFetch(depth, ivec3(pixel, 0), k).r; }
-uint surface_seen(ivec2 pixel, int k) { return texelFetch(quads_seen, ivec3(pixel, 0), k).r; }
 
 // The quad of the ground that a sample sees, counted from 1; 0 where it sees the sky, or a mesh before either.
 uint ground_quad(ivec2 pixel, int k) {
@@ -122,7 +111,7 @@ GroundPoint point_at(ivec2 pixel, uint seen, vec2 size, Camera camera, out vec3 
         uint other = ground_quad(pixel, int(k));
         bool counts = (seen >> k & 1u) != 0u && (quad == 0u || other == quad);
         vec2 offset = vec2(pixel) + 0.5 + sample_offset(k, SAMPLES) - 0.5 * size;
-        float depth = view.v.clip_from_world[3].z / ground_depth(pixel, int(k));
+        float depth = view.v.clip_from_world[3].z / surface_depth(pixel, int(k));
         quad = counts ? other : quad;
         sum += counts ? depth * (camera.forward + offset.x * camera.right + offset.y * camera.down) : vec3(0.0);
         count += counts ? 1.0 : 0.0;

@@ -35,7 +35,7 @@ void list_pixels(uvec2 corner, uint column, uvec2 size) {
         if (inside && samples == 0u && open != 0u && (!SKY_DRAWN || open + 1u != 1u << SAMPLES)) {
             store_pixel(ivec2(pixel), scaled(sky_at(ivec2(pixel)), float(bitCount(open)) / float(SAMPLES)));
         }
-        if (inside && (open & 1u) != 0u) store_first(ivec2(pixel), 0u, ground_depth(ivec2(pixel), 0));
+        if (inside && (open & 1u) != 0u) store_first(ivec2(pixel), 0u, surface_depth(ivec2(pixel), 0));
     }
     counts[column] = count;
 }

@@ -14,6 +14,17 @@ uint cascade_at(vec4 far, uint count, float distance) {
     return nearer < count ? nearer : MAX_CASCADES;
 }
 
+// The matrix of one of the cascades, and the texel of the shadow map where its first one is. By choice, because not all drivers index as well.
+mat4 cascade_matrix(View v, uint cascade, out vec2 turn) {
+    mat4 shadow = v.cascade_from_world[0];
+    turn = v.cascade_turn[0].xy;
+    for (uint k = 1u; k < MAX_CASCADES; k++) {
+        if (k == cascade) shadow = v.cascade_from_world[k];
+        if (k == cascade) turn = v.cascade_turn[k].xy;
+    }
+    return shadow;
+}
+
 // Trees write their depth with a name of 8 bits in place of its last ones, so that what is on a tree knows the tree itself from others.
 float named_depth(float depth, uint name) { return uintBitsToFloat((floatBitsToUint(depth) & ~255u) | (name & 255u)); }
 

@@ -76,7 +76,7 @@ impl Envelopes {
             .map(|t| f64::from(t as f32))
             .collect();
         progress.finish();
-        let hiding = hiding(surface, directions);
+        let hiding = hiding(surface, &caster, directions);
         Envelopes { parts, thickness, directions: directions.len(), hiding }
     }
 

@@ -18,13 +18,12 @@ const RAYS: usize = 96;
 
 /// The area A(ω, z) for what of every direction's cell is above the horizon, towards the middle of that, and, direction by direction, every
 /// height; over the area that the tree covers from above. 0 of directions that look down.
-pub fn hiding(surface: &Surface, directions: &Directions) -> Vec<f64> {
-    let caster = Caster::new(surface);
+pub fn hiding(surface: &Surface, caster: &Caster, directions: &Directions) -> Vec<f64> {
     let of = |w: &[f64; 3]| {
         let w = DVec3::from(*w).normalize_or_zero();
-        if w.z > 1e-9 { hidden(surface, &caster, w) } else { [0.0; HEIGHTS] }
+        if w.z > 1e-9 { hidden(surface, caster, w) } else { [0.0; HEIGHTS] }
     };
-    let above = hidden(surface, &caster, DVec3::Z)[0].max(1e-9);
+    let above = hidden(surface, caster, DVec3::Z)[0].max(1e-9);
     let all: Vec<[f64; HEIGHTS]> = directions.half(true).par_iter().map(of).collect();
     all.into_iter().flatten().map(|area| f64::from((area / above) as f32)).collect()
 }
@@ -99,7 +98,7 @@ mod tests {
         square([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 2.0], [-1.0, 0.0, 2.0]]);
         let surface = Surface::new(&mesh).unwrap();
         let rule = Directions::new(14).unwrap();
-        let all = hiding(&surface, &rule);
+        let all = hiding(&surface, &Caster::new(&surface), &rule);
         let of = |w: [f64; 3]| {
             let k = rule.to.iter().position(|to| (0..3).all(|i| (to[i] - w[i]).abs() < 1e-6)).unwrap();
             &all[k * HEIGHTS..][..HEIGHTS]

@@ -14,7 +14,7 @@ use crate::physics::crown::Crown;
 use crate::physics::leaf::Directions;
 use crate::plan::names::resource;
 use crate::plan::{Plan, envelope_words};
-use crate::scene::{Distribution, Scene, Species};
+use crate::scene::{Scene, Species};
 use crate::{Error, Result};
 
 /// Steps of texture coordinates along a texture; as `UV_STEPS` in `shaders/frame/trees/meshes/corner.glsl`.
@@ -207,12 +207,7 @@ fn hiding_pairs(scene: &Scene, baked: &[Baked], directions: usize) -> (Vec<[f32;
 
 /// Optical thickness of a species' crowns from above in all of a scene, at its full density.
 fn thickness(scene: &Scene, species: &Species, crown: &Crown) -> f64 {
-    let density = match &species.distribution {
-        Distribution::Density { max_density, .. } => f64::from(*max_density),
-        Distribution::Positions(list) => {
-            list.len() as f64 / (scene.terrain.extent[0] * scene.terrain.extent[1])
-        }
-    };
+    let density = species.full_density(scene.terrain.extent);
     density * std::f64::consts::PI * f64::from(crown.radius).powi(2) * mean_squared_scale(species)
 }
 

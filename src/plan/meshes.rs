@@ -18,7 +18,7 @@ const MASK_SIDES: [u32; 2] = [16, 1024];
 
 /// Texels along a side of the masks of some meshes, which are layers of one array: as many as the largest has; and how many there are.
 /// A material without holes has none.
-pub fn leaf_masks<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> (u32, u32) {
+fn leaf_masks<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> (u32, u32) {
     let [least, most] = MASK_SIDES;
     let masked = meshes.flat_map(|m| &m.materials).filter(|m| m.alpha_cutoff.is_some());
     let sides = masked.filter_map(|m| m.texture.as_ref()).map(|t| t.width.max(t.height));

@@ -23,7 +23,7 @@ use crate::scene::{Camera, Scene};
 
 pub use data::{NODE_TEXELS, QUAD_INDEX_BYTES, tables};
 pub use items::Item;
-pub use meshes::{envelope_words, leaf_masks};
+pub use meshes::envelope_words;
 pub use tiles::{Drawing, Rasterizer, TILE_STEPS, TileBuffer, TileBuffers};
 
 /// Storage buffers that every Vulkan device binds, when no device is known.

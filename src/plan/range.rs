@@ -2,7 +2,7 @@
 
 use super::Plan;
 use crate::camera::Eye;
-use crate::scene::{Distribution, Scene, Species};
+use crate::scene::Scene;
 
 impl Plan {
     /// The range of every species and of all, the size of trees, and where they are drawn in another way.
@@ -10,7 +10,7 @@ impl Plan {
         let s = &scene.settings;
         self.forest = tree_density(scene) > 0.0;
         for species in &scene.species {
-            let scale = largest_scale(species);
+            let scale = species.largest_scale();
             let reach = species.mesh.positions.iter().map(|p| p[0].hypot(p[1]).max(p[2])).fold(0.0, f32::max);
             self.tallest = self.tallest.max(f64::from(reach) * scale);
         }
@@ -21,7 +21,7 @@ impl Plan {
             self.species_range.push(range);
             let mesh = self.ladder.mesh_range(s, f64::from(height) * eye.pixels_at_1m);
             self.mesh_range.push(mesh);
-            self.last_mesh_range = self.last_mesh_range.max(mesh * largest_scale(species));
+            self.last_mesh_range = self.last_mesh_range.max(mesh * species.largest_scale());
             self.range = self.range.max(range);
         }
         if self.ladder.averages() {
@@ -122,15 +122,6 @@ impl Plan {
     }
 }
 
-/// The largest scale that a tree of a species has.
-fn largest_scale(species: &Species) -> f64 {
-    let listed = match &species.distribution {
-        Distribution::Positions(list) => list.iter().filter_map(|p| p.scale).fold(0.0, f32::max),
-        Distribution::Density { .. } => 0.0,
-    };
-    f64::from(species.scale[1].max(listed))
-}
-
 /// Whether something is so of the ground nearest to a place, or of all ground: its extent and two heights.
 fn near_ground(scene: &Scene, place: [f64; 3], is: impl Fn([f64; 2], [f64; 2]) -> bool) -> bool {
     let terrain = &scene.terrain;
@@ -147,13 +138,7 @@ fn farthest_in([low, high]: [[f64; 3]; 2], place: [f64; 3]) -> f64 {
 
 /// Trees per m² of all species together, at most.
 pub(super) fn tree_density(scene: &Scene) -> f64 {
-    let of = |d: &Distribution| match d {
-        Distribution::Density { max_density, .. } => f64::from(*max_density),
-        Distribution::Positions(list) => {
-            list.len() as f64 / (scene.terrain.extent[0] * scene.terrain.extent[1])
-        }
-    };
-    scene.species.iter().map(|s| of(&s.distribution)).sum()
+    scene.species.iter().map(|s| s.full_density(scene.terrain.extent)).sum()
 }
 
 /// The farthest that trees are from an eye, m: as far as the terrain is, seen from here or from anywhere on it.

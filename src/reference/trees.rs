@@ -172,9 +172,5 @@ impl<'a> Region<'a> {
 /// Height of the tallest tree of a species, or its reach to a side if that is more, m.
 fn tallest(species: &crate::scene::Species) -> f64 {
     let reach = species.mesh.positions.iter().map(|p| p[0].hypot(p[1]).max(p[2])).fold(0.0, f32::max);
-    let scale = match &species.distribution {
-        Distribution::Density { .. } => species.scale[1],
-        Distribution::Positions(list) => list.iter().filter_map(|p| p.scale).fold(species.scale[1], f32::max),
-    };
-    f64::from(reach * scale)
+    f64::from(reach * species.largest_scale() as f32)
 }

@@ -112,6 +112,25 @@ pub struct Species {
     pub optics: OpticsOverride,
 }
 
+impl Species {
+    /// The largest scale that a tree of it has.
+    pub fn largest_scale(&self) -> f64 {
+        let listed = match &self.distribution {
+            Distribution::Positions(list) => list.iter().filter_map(|p| p.scale).fold(0.0, f32::max),
+            Distribution::Density { .. } => 0.0,
+        };
+        f64::from(self.scale[1].max(listed))
+    }
+
+    /// Trees of it per m² of a terrain of this extent: at most, or where they are listed on average.
+    pub fn full_density(&self, extent: [f64; 2]) -> f64 {
+        match &self.distribution {
+            Distribution::Density { max_density, .. } => f64::from(*max_density),
+            Distribution::Positions(list) => list.len() as f64 / (extent[0] * extent[1]),
+        }
+    }
+}
+
 /// Optical properties that the scene states instead of the model.
 #[derive(Clone, Debug, Default)]
 pub struct OpticsOverride {

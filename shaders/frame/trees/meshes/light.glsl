@@ -5,7 +5,7 @@
 #include "physics/shadow.glsl"
 #include "physics/leaf.glsl"
 #include "frame/trees/zfield_space.glsl"
-#include "frame/trees/meshes/seen.glsl"
+#include "frame/surfaces_seen.glsl"
 #include "frame/trees/meshes/corner.glsl"
 #include "frame/camera.glsl"
 #include "frame/samples.glsl"
@@ -28,13 +28,6 @@ layout(std140, binding = 9) uniform Leaves { vec4 items[2u * 26u]; } rule;
 layout(std140, binding = 12) uniform Optics { vec4 items[3u * MAX_SPECIES]; } optics; // of each species: reflectance and transmittance of leaves, bark
 layout(binding = 13) uniform sampler2DArray shadow_map;
 layout(binding = 14) uniform samplerBuffer hiding;    // of each direction, HIDING_STEPS pairs
-#ifdef SINGLE
-layout(binding = 10) uniform sampler2DArray depth;
-layout(binding = 11) uniform usampler2DArray quads_seen;
-#else
-layout(binding = 10) uniform sampler2DMSArray depth;
-layout(binding = 11) uniform usampler2DMSArray quads_seen;
-#endif
 layout(push_constant) uniform Push { MeshLightParameters p; };
 layout(constant_id = 0) const uint SAMPLES = 4u;
 layout(constant_id = 1) const bool HAS_SUN = true;
@@ -69,12 +62,8 @@ LeafLight leaf_light(uint face, vec3 n, vec3 viewer, vec3 sun, float height, flo
 float sun_left(Tree t, Species kind, vec3 world, vec3 n, float own) {
     View v = view.v;
     uint cascade = min(cascade_of(t), MAX_CASCADES - 1u);
-    mat4 shadow = v.cascade_from_world[0];
-    vec2 turn = v.cascade_turn[0].xy;
-    for (uint k = 1u; k < MAX_CASCADES; k++) {
-        if (k == cascade) shadow = v.cascade_from_world[k];
-        if (k == cascade) turn = v.cascade_turn[k].xy;
-    }
+    vec2 turn;
+    mat4 shadow = cascade_matrix(v, cascade, turn);
     vec3 at = (shadow * vec4(world, 1.0)).xyz;
     float deeper = (shadow * vec4(v.sun_direction, 0.0)).z;
     // Half a texel towards the sun, so that nothing shades itself.
@@ -122,7 +111,7 @@ Shown shade(uint what, vec3 world) {
 
 uint sample_sees(ivec2 pixel, int k) {
     uint tree = texelFetch(seen, int((pixel.y * int(p.size.x) + pixel.x) * int(SAMPLES)) + k).x;
-    uint what = texelFetch(quads_seen, ivec3(pixel, 0), k).r;
+    uint what = surface_seen(pixel, k);
     return tree == 0u && is_mesh(what) ? what : 0u;
 }
 
@@ -131,7 +120,7 @@ bool sees_past(ivec2 pixel) {
     bool past = false;
     for (uint k = 0u; k < SAMPLES; k++) {
         uint tree = texelFetch(seen, int((pixel.y * int(p.size.x) + pixel.x) * int(SAMPLES) + int(k))).x;
-        past = past || (tree == 0u && !is_mesh(texelFetch(quads_seen, ivec3(pixel, 0), int(k)).r));
+        past = past || (tree == 0u && !is_mesh(surface_seen(pixel, int(k))));
     }
     return past;
 }
@@ -144,13 +133,12 @@ vec3 place_of(ivec2 pixel, uint samples) {
     vec3 sum = vec3(0.0);
     for (uint k = 0u; k < SAMPLES; k++) {
         vec2 offset = vec2(pixel) + 0.5 + sample_offset(k, SAMPLES) - 0.5 * vec2(p.size);
-        float deep = view.v.clip_from_world[3].z / max(texelFetch(depth, ivec3(pixel, 0), int(k)).r, 1e-30);
+        float deep = view.v.clip_from_world[3].z / max(surface_depth(pixel, int(k)), 1e-30);
         sum += (samples >> k & 1u) != 0u ? deep * (camera.forward + offset.x * camera.right + offset.y * camera.down) : vec3(0.0);
     }
     return sum / float(bitCount(samples));
 }
 
-shared Shown shown[8u * MOST_ITEMS];
 
 void main() {
     uvec2 corner = tile_corner();
@@ -165,22 +153,15 @@ void main() {
     barrier();
     uint item = column * MOST_ITEMS, end = item + counts[column];
     for (uint row = 0u; row < TILE_SIDE; row++) {
-        Shown all = shown_nothing();
-        uint covered = 0u, first = ~0u;
-        while (item < end && places[item] >> 8u == row) {
-            uint samples = places[item] & 0xffu;
-            all = sum(all, scaled(shown[item], float(bitCount(samples)) / float(SAMPLES)));
-            first = (samples & 1u) != 0u ? item : first;
-            covered |= samples;
-            item++;
-        }
+        uint covered, first;
+        Shown all = row_shown(row, end, item, covered, first);
         ivec2 pixel = ivec2(corner + uvec2(column, row));
         if (covered != 0u && sees_past(pixel)) all = sum(all, load_pixel(pixel));
         if (covered != 0u) store_pixel(pixel, all);
 #ifdef LAYERS
         if (first != ~0u) {
             uint kind = texelFetch(trees, int(mesh_trees.items[seen_tree(ranks[first])]) * 8 + 1).z;
-            store_first(pixel, kind + 1u, texelFetch(depth, ivec3(pixel, 0), 0).r);
+            store_first(pixel, kind + 1u, surface_depth(pixel, 0));
         }
 #endif
     }

@@ -76,12 +76,7 @@ Shown shade(uint rank, vec2 offset, out float depth) {
     ray.layers = light_layers;
     ray.weights = vec3(t.light_weights, 1.0 - t.light_weights.x - t.light_weights.y);
     uint cascade = min(cascade_of(t), MAX_CASCADES - 1u);
-    mat4 shadow = v.cascade_from_world[0];
-    ray.turn = v.cascade_turn[0].xy;
-    for (uint k = 1u; k < MAX_CASCADES; k++) {
-        if (k == cascade) shadow = v.cascade_from_world[k];
-        if (k == cascade) ray.turn = v.cascade_turn[k].xy;
-    }
+    mat4 shadow = cascade_matrix(v, cascade, ray.turn);
     ray.entry = (shadow * vec4(world, 1.0)).xyz;
     ray.deeper = (shadow * vec4(v.sun_direction, 0.0)).z;
     // A texel spans crowns whose backs slope by about one: half a texel towards the sun, or neighbours shade each other's rims.
@@ -111,7 +106,6 @@ uint sample_sees(ivec2 pixel, int k) { return texelFetch(seen, int((pixel.y * in
 
 #include "frame/trees/distinct.glsl"
 
-shared Shown shown[8u * MOST_ITEMS];
 #ifdef LAYERS
 shared float depths[8u * MOST_ITEMS];
 #endif
@@ -135,15 +129,8 @@ void main() {
     barrier();
     uint item = column * MOST_ITEMS, end = item + counts[column];
     for (uint row = 0u; row < TILE_SIDE; row++) {
-        Shown all = shown_nothing();
-        uint covered = 0u, first = ~0u;
-        while (item < end && places[item] >> 8u == row) {
-            uint samples = places[item] & 0xffu;
-            all = sum(all, scaled(shown[item], float(bitCount(samples)) / float(SAMPLES)));
-            first = (samples & 1u) != 0u ? item : first;
-            covered |= samples;
-            item++;
-        }
+        uint covered, first;
+        Shown all = row_shown(row, end, item, covered, first);
         ivec2 pixel = ivec2(corner + uvec2(column, row));
         // What the others of its samples see is there. Where every sample sees a tree, nothing is yet.
         if (covered != 0u && covered + 1u != 1u << SAMPLES) all = sum(all, load_pixel(pixel));
