@@ -12,6 +12,7 @@
 #include "physics/handover.glsl"
 #include "physics/shadow.glsl"
 #include "physics/masks.glsl"
+#include "physics/indirect.glsl"
 #include "forest/cull.glsl"
 #include "forest/members.glsl"
 
@@ -36,6 +37,11 @@ layout(constant_id = 4) const bool PAIR_TABLES = true; // the sun's average ligh
 layout(binding = 10) uniform sampler3D pair_table;
 layout(binding = 11) uniform sampler2DArray view_table;
 layout(binding = 12) uniform sampler2DArray heights;
+layout(binding = 13) uniform samplerBuffer indirect;
+layout(std430, binding = 14) writeonly buffer HandedLight { uvec4 items[]; } handed_light; // of each tree: the sun's, the sky's
+layout(constant_id = 6) const bool INDIRECT = false;
+layout(constant_id = 7) const int INDIRECT_FIRST = 0;  // texel where the first species' begins
+layout(constant_id = 8) const int INDIRECT_NODES = 2;  // of the density
 
 uint rank_in(uint list, uint thread) {
     uint rank = 0u, word = thread >> 5u;
@@ -132,6 +138,18 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     return t;
 }
 
+// Light that met more than one surface, of a tree among others of thickness x.
+uvec4 handed_on(Tree t, Species kind, vec3 ground, float x) {
+    vec3 l = view.v.sun_direction, to_camera = -normalize(t.centre);
+    int base = INDIRECT_FIRST + int(t.species) * INDIRECT_NODES * INDIRECT_NODE;
+    IndirectAt at = indirect_at(x, texelFetch(indirect, 0).w, INDIRECT_NODES);
+    Handed sun = indirect_near_sun(indirect, base, at, to_camera.z, l.z, dot(to_camera, l)), sky = indirect_near_sky(indirect, base, at, to_camera.z);
+    float tint = unpackHalf2x16(t.cascade_tint).y;
+    sun.colour *= (tint * sun_facing(l, ground)) * view.v.sun_irradiance;
+    sky.colour *= tint * view.v.sky_radiance;
+    return uvec4(pack_handed(sun), pack_handed(sky));
+}
+
 void main() {
     uint thread = gl_LocalInvocationIndex, group = gl_WorkGroupID.x;
     clear_members(thread);
@@ -143,7 +161,12 @@ void main() {
     Seed s = seeds.items[q.region * p.region_capacity + (group % p.groups_per_region) * CULL_GROUP + thread];
     Species kind = species.items[s.species_density & 0xffffu];
     uint index = counts.items[group] + rank_in(0u, thread);
-    trees.items[index] = make_tree(q, s, tree_centre(view.v, q, s, kind), kind);
+    Tree t = make_tree(q, s, tree_centre(view.v, q, s, kind), kind);
+    trees.items[index] = t;
+    if (INDIRECT) {
+        float density = unpackHalf2x16(s.species_density).y;
+        handed_light.items[index] = handed_on(t, kind, normalize(vec3(-unpackHalf2x16(s.slope), 1.0)), density * density * kind.mean_area);
+    }
     uint list = 1u + (seen & 31u);
     lists.items[starts.items[list] + counts.items[list * p.group_count + group] + rank_in(list, thread)] = index;
 }

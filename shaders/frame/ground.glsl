@@ -3,9 +3,13 @@
 #include "physics/light.glsl"
 #include "physics/shadow.glsl"
 #include "physics/handover.glsl"
+#include "physics/indirect.glsl"
 
 layout(binding = 4) uniform sampler2DArray albedo;
 layout(binding = 5) uniform sampler2DArray shadow_map;
+layout(binding = 9) uniform samplerBuffer indirect;
+layout(constant_id = 7) const bool INDIRECT = false;
+layout(constant_id = 8) const int INDIRECT_NODES = 2; // of the density
 layout(constant_id = 5) const bool HAS_SUN = true;
 layout(constant_id = 6) const bool SHADOWED = true; // within reach of a cascade
 
@@ -64,6 +68,14 @@ GroundLight ground_light(GroundPoint at, vec3 n) {
     float open = open_ground(thickness * at.paths.x, at.paths.x / max(at.paths.y, 1e-9), crowns, expected);
     vec3 sun = reflectance * (cosine * lit / PI) * view.v.sun_irradiance;
     vec3 sky = reflectance * (ground_sky(n.z, exp(-here * at.vertical.x), here) * contrast) * view.v.sky_radiance;
+    if (INDIRECT) {
+        IndirectAt between_nodes = indirect_at(here, texelFetch(indirect, 0).w, INDIRECT_NODES);
+        sky += reflectance * indirect_ground_sky(indirect, between_nodes) * view.v.sky_radiance;
+        if (HAS_SUN) {
+            float facing = smoothstep(0.0, 0.0349, dot(n, view.v.sun_direction));
+            sun += (reflectance * facing) * indirect_ground_sun(indirect, between_nodes, view.v.sun_direction.z) * view.v.sun_irradiance;
+        }
+    }
     g.sun = mix(max(at.tree_sun.rgb, 0.0), sun, open);
     g.sky = mix(max(at.tree_sky.rgb, 0.0), sky, open);
     g.trees = 1.0 - open;

@@ -3,6 +3,8 @@
 //! - `.zfield`, the depth views with their occlusion, and the measured crown and optics: of the model and the knobs of views. All
 //!   else is made from these.
 //! - `.transfer`, the light transfer of the views: of these and of the number of bands, whose coefficients are fitted together.
+//! - `.indirect`, light that met more than one surface ([`super::indirect`]): of a forest: its
+//!   models, their reflectances and densities, and the ground.
 //! - `.envelopes`, the crown around each leaf ([`super::envelope`]): of the model and of the number of directions.
 //! - `.forest`, the tables of far forests ([`super::tables`]): of both.
 
@@ -11,6 +13,7 @@ use std::path::{Path, PathBuf};
 use super::envelope::{Envelopes, Parts, RAYS};
 use super::file::{Fields, Format, load_or_build};
 use super::hiding::HEIGHTS;
+use super::indirect::{self, Mix};
 use super::surface::Surface;
 use super::{
     BakeSettings, ForestSettings, SpeciesBake, Turned, bake_transfer, bake_views, check, load_or_measure,
@@ -18,6 +21,7 @@ use super::{
 use crate::Result;
 use crate::physics::correction::{Correction, TERMS};
 use crate::physics::crown::{Crown, Frame};
+use crate::physics::indirect::{COEFFICIENTS, Indirect};
 use crate::physics::leaf::Directions;
 use crate::physics::tables::ForestTables;
 use crate::physics::transfer::Transfer;
@@ -27,6 +31,7 @@ use crate::scene::{Mesh, OpticsOverride};
 
 const VIEWS: Format = Format { magic: *b"CANOPYZF", version: 14, extension: "zfield" };
 const TRANSFER: Format = Format { magic: *b"CANOPYLT", version: 4, extension: "transfer" };
+const INDIRECT: Format = Format { magic: *b"CANOPYIL", version: 5, extension: "indirect" };
 const ENVELOPES: Format = Format { magic: *b"CANOPYLE", version: 5, extension: "envelopes" };
 /// Numbers at the head of a file of views.
 const SCALARS: usize = 23 + 4 * TERMS;
@@ -234,6 +239,53 @@ fn envelopes_key(mesh: &Mesh, directions: u32) -> [u8; 32] {
         fields.put(&x.to_le_bytes());
     }
     put_mesh(&mut fields, mesh);
+    fields.key()
+}
+
+/// Light that met more than one surface, of a species of a forest, from the cache if it is there, else measured and put there.
+///
+/// # Errors
+/// [`crate::Error::Usage`] for a mesh without extent.
+pub fn load_indirect(
+    dir: Option<&Path>,
+    mix: &Mix,
+    species: usize,
+    quiet: bool,
+) -> Result<(Indirect, CacheState)> {
+    load_or_build(
+        (dir, &INDIRECT, &indirect_key(mix, species)),
+        &[4, 3 * 4 * COEFFICIENTS * mix.nodes as usize],
+        |read| {
+            let all: Vec<[f32; 3]> = bytemuck::pod_collect_to_vec(&read[1]);
+            let nodes = all.as_chunks::<COEFFICIENTS>().0.to_vec();
+            Indirect { max_thickness: floats(&read[0])[0] as f32, nodes }
+        },
+        |built, put| {
+            put(&built.max_thickness.to_le_bytes())?;
+            built.nodes.iter().try_for_each(|node| put(bytemuck::cast_slice(node)))
+        },
+        || indirect::measure(mix, species, quiet),
+        quiet,
+    )
+}
+
+/// BLAKE3 of everything that light which met more than one surface depends on.
+fn indirect_key(mix: &Mix, species: usize) -> [u8; 32] {
+    let mut fields = Fields::new("canopy indirect light");
+    for x in [INDIRECT.version, mix.nodes, mix.rays, u32::from(mix.poisson), species as u32] {
+        fields.put(&x.to_le_bytes());
+    }
+    fields.put(bytemuck::bytes_of(&mix.ground));
+    for kind in &mix.kinds {
+        fields.put(&kind.density.to_le_bytes());
+        fields.put(bytemuck::bytes_of(&kind.scale));
+        fields.put(bytemuck::bytes_of(&kind.bark_ratio));
+        let optics = kind.optics;
+        for rgb in [optics.leaf_reflectance, optics.leaf_transmittance, optics.bark_reflectance] {
+            fields.put(rgb.as_ref().map_or(&[], bytemuck::bytes_of));
+        }
+        put_mesh(&mut fields, kind.mesh);
+    }
     fields.key()
 }
 

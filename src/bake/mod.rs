@@ -5,7 +5,10 @@ mod correction;
 pub mod envelope;
 #[doc(hidden)]
 pub mod file;
+pub(crate) mod foliage;
+pub(crate) mod grove;
 pub mod hiding;
+pub mod indirect;
 mod least_squares;
 pub(crate) mod occlusion;
 pub(crate) mod optics;
@@ -88,6 +91,13 @@ impl SpeciesBake {
             k.reflected * self.reflectance[i] + k.bark_reflected * self.bark_reflectance[i]
         });
         [reflectance, self.transmittance.map(|x| k.passed * x)]
+    }
+
+    /// Reflectance of bark over the albedo of the crown's leaves, linear RGB.
+    pub fn bark_ratio(&self) -> [f32; 3] {
+        let [reflectance, transmittance] = self.crown_leaves();
+        // Black leaves have no colour to compare with.
+        std::array::from_fn(|i| self.bark_reflectance[i] / (reflectance[i] + transmittance[i]).max(1e-3))
     }
 
     /// What is left out of the sunlight that is sent to the viewer: by the crown's laws, and by light transfer where there is any.

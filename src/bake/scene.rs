@@ -4,9 +4,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::envelope::Envelopes;
-use super::{CacheState, ForestSettings, Source, SpeciesBake};
+use super::indirect::{Kind, Mix};
+use super::{cache, CacheState, ForestSettings, Source, SpeciesBake};
 use crate::Result;
 use crate::ladder::Ladder;
+use crate::physics::indirect::Indirect;
 use crate::physics::tables::ForestTables;
 use crate::plan::Plan;
 use crate::scene::{Distribution, Scene};
@@ -20,6 +22,8 @@ pub struct Baked {
     pub tables: Arc<ForestTables>,
     /// The crown around its leaves, where it is drawn as a mesh.
     pub envelopes: Option<Arc<Envelopes>>,
+    /// Light that met more than one surface in the scene's forest, where it counts.
+    pub indirect: Option<Arc<Indirect>>,
 }
 
 /// Where the parts of a [`Baked`] came from.
@@ -33,6 +37,8 @@ pub struct BakedFrom {
     pub tables: CacheState,
     /// The crown around its leaves; `None` where nothing needed it.
     pub envelopes: Option<CacheState>,
+    /// Light that met more than one surface; `None` where it is left out.
+    pub indirect: Option<CacheState>,
 }
 
 /// What is needed of a scene's species.
@@ -47,11 +53,13 @@ pub struct Needs {
     pub transfer: bool,
     /// The crown around each leaf, to draw trees as meshes.
     pub envelopes: bool,
+    /// Light that met more than one surface, where the settings ask for it.
+    pub indirect: bool,
 }
 
 impl Needs {
     /// All but what meshes take, for whoever draws by several plans.
-    pub const ALL: Needs = Needs { trees: true, transfer: true, envelopes: false };
+    pub const ALL: Needs = Needs { trees: true, transfer: true, envelopes: false, indirect: true };
 
     /// All that plans of these ladders may need.
     pub fn of(ladders: impl IntoIterator<Item = Ladder>) -> Self {
@@ -61,7 +69,12 @@ impl Needs {
 
 impl From<&Plan> for Needs {
     fn from(plan: &Plan) -> Self {
-        Needs { trees: plan.forest, transfer: plan.transfer_bands > 0, envelopes: plan.meshes }
+        Needs {
+            trees: plan.forest,
+            transfer: plan.transfer_bands > 0,
+            envelopes: plan.meshes,
+            indirect: plan.indirect > 0,
+        }
     }
 }
 
@@ -119,8 +132,43 @@ pub fn load_or_bake_scene(
             species: Arc::new(species),
             tables: Arc::new(measured),
             envelopes: around.map(|a| Arc::new(a.0)),
+            indirect: None,
         };
-        all.push((one, BakedFrom { views, transfer, tables, envelopes }));
+        all.push((one, BakedFrom { views, transfer, tables, envelopes, indirect: None }));
+    }
+    if needs.trees && needs.indirect && scene.settings.indirect > 0 {
+        load_indirect_light(scene, &mut all, dir, quiet)?;
     }
     Ok(all)
+}
+
+/// Light that met more than one surface in a scene's forest, which is measured among trees of all its species.
+fn load_indirect_light(
+    scene: &Scene,
+    baked: &mut [(Baked, BakedFrom)],
+    dir: Option<&Path>,
+    quiet: bool,
+) -> Result<()> {
+    let kinds = scene.species.iter().zip(&*baked).map(|(s, (b, _))| Kind {
+        mesh: &s.mesh,
+        optics: &s.optics,
+        crown: b.species.crown,
+        bark_ratio: b.species.bark_ratio(),
+        // A scene without trees still has species: any density will do.
+        density: s.full_density(scene.terrain.extent).max(1e-6),
+        scale: s.scale,
+    });
+    let mix = Mix {
+        kinds: kinds.collect(),
+        ground: scene.terrain.mean_albedo(),
+        nodes: scene.settings.table_densities,
+        rays: scene.settings.table_rays,
+        poisson: scene.species.iter().all(|s| matches!(s.distribution, Distribution::Positions(_))),
+    };
+    for (k, (one, from)) in baked.iter_mut().enumerate() {
+        let (light, state) = cache::load_indirect(dir, &mix, k, quiet)?;
+        one.indirect = Some(Arc::new(light));
+        from.indirect = Some(state);
+    }
+    Ok(())
 }

@@ -4,6 +4,7 @@
 //! write every tree's record and its index into the lists, each at the place that the sums give it. No atomics on
 //! memory decide any order, so the same seeds give the same bits. [`classify`] is the CPU's twin of the decision.
 
+use super::indirect::IndirectData;
 use super::seeds::SeedData;
 use super::species::SpeciesData;
 use super::tables::TableData;
@@ -79,6 +80,9 @@ impl CullData {
             ("TABLE_DENSITIES", float(tables.densities)),
             ("PAIR_TABLES", u32::from(plan.pair_tables)),
             ("SAMPLES", plan.samples),
+            ("INDIRECT", u32::from(plan.indirect > 0)),
+            ("INDIRECT_FIRST", IndirectData::first_species(plan)),
+            ("INDIRECT_NODES", plan.indirect.max(2)),
         ];
         Ok(CullData {
             trees: gpu.described_buffer(&plan.buffer(resource::TREES))?,
@@ -117,7 +121,7 @@ impl CullData {
         view: &Buffer,
         seeds: &SeedData,
         species: &SpeciesData,
-        tables: &TableData,
+        (tables, indirect): (&TableData, &IndirectData),
         terrain: &TerrainData,
     ) {
         let groups_per_region = seeds.region_capacity / CULL_GROUP;
@@ -145,6 +149,8 @@ impl CullData {
             ("lists", Resource::Buffer(&self.lists)),
             ("pair_table", Resource::Texture(&tables.pairs, Sampler::Linear)),
             ("view_table", Resource::Texture(&tables.views, Sampler::Linear)),
+            ("indirect", Resource::Texels(&indirect.nodes)),
+            ("handed_light", Resource::Buffer(&indirect.handed)),
             ("heights", Resource::Texture(&terrain.heights, Sampler::Nearest)),
         ];
         let groups = [parameters.group_count, 1, 1];

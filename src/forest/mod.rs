@@ -5,6 +5,7 @@ pub mod cache;
 pub mod casters;
 pub mod coverage;
 pub mod cull;
+pub mod indirect;
 pub mod meshes;
 pub mod pages;
 pub mod seeds;

@@ -281,10 +281,7 @@ fn rows(
             map_size,
             slope_softness: if slope.is_some() { SLOPE_SOFTNESS * tangent } else { 1.0 },
             bare_below: crown.bare_below(),
-            // Black leaves have no colour to compare with.
-            bark_ratio: std::array::from_fn(|i| {
-                bake.bark_reflectance[i] / (reflectance[i] + transmittance[i]).max(1e-3)
-            }),
+            bark_ratio: bake.bark_ratio(),
             mean_area: std::f32::consts::PI * crown.radius.powi(2) * mean_squared_scale(species) as f32,
             vertical_scale: tables.vertical_scale,
             sky_path: forest::sky_path(tables) as f32,

@@ -29,6 +29,7 @@ pub fn mesh_indices(gpu: &Gpu) -> Result<Buffer> {
 pub struct NoTrees {
     coverage: Image,
     nodes: Buffer,
+    indirect: Buffer,
 }
 
 impl NoTrees {
@@ -40,12 +41,13 @@ impl NoTrees {
         Ok(NoTrees {
             coverage: gpu.image(&ImageDesc::stand_in("no coverage", plan.cover_format()))?,
             nodes: gpu.texel_buffer("no nodes", size_of::<ForestNode>() as u64, NODE_TEXELS)?,
+            indirect: gpu.texel_buffer("no indirect light", NODE_TEXELS.1, NODE_TEXELS)?,
         })
     }
 
-    /// Coverage tiles and shader-map nodes of the forest, or these.
-    pub fn or<'a>(&'a self, forest: Option<(&'a Forest, &'a ShaderMap)>) -> (&'a Image, &'a Buffer) {
-        forest.map_or((&self.coverage, &self.nodes), |(f, map)| (&f.coverage.tiles, &map.nodes))
+    /// Coverage tiles, shader-map nodes and indirect light of the forest, or these.
+    pub fn or<'a>(&'a self, forest: Option<(&'a Forest, &'a ShaderMap)>) -> (&'a Image, [&'a Buffer; 2]) {
+        forest.map_or((&self.coverage, [&self.nodes, &self.indirect]), |(f, map)| (&f.coverage.tiles, [&map.nodes, &f.indirect.nodes]))
     }
 }
 
@@ -71,6 +73,8 @@ impl Ground {
                 ("COVER_SIDE", plan.coverage_size),
                 ("HAS_SUN", u32::from(plan.sun)),
                 ("SHADOWED", u32::from(shadowed)),
+                ("INDIRECT", u32::from(plan.indirect > 0)),
+                ("INDIRECT_NODES", plan.indirect.max(2)),
             ];
             if plan.view_mode != ViewMode::Radiance {
                 constants.push(("VIEW_MODE", plan.view_mode as u32));
@@ -113,7 +117,7 @@ impl Ground {
         let colors: Vec<_> =
             targets.colors.iter().enumerate().map(|(k, t)| t.attachment(color(k), last)).collect();
         let depth = Some(targets.depth.attachment(Some([0.0; 4]), last));
-        let (tiles, nodes) = self.none.or(forest);
+        let (tiles, [nodes, indirect]) = self.none.or(forest);
         recorder.render(pass::TERRAIN, &Targets { colors: &colors, depth, layers: Layers::One(0) }, |pass| {
             let resources = [
                 ("view", Resource::Buffer(view)),
@@ -124,6 +128,7 @@ impl Ground {
                 ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
                 ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
                 ("nodes", Resource::Buffer(nodes)),
+                ("indirect", Resource::Texels(indirect)),
             ];
             let near = self.shadowed.iter().map(|p| (p, 0..draws.shadowed));
             for (program, quads) in near.chain([(&self.beyond, draws.shadowed..draws.camera.1)]) {

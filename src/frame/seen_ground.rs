@@ -56,6 +56,8 @@ impl SeenGround {
                     ("SKY_DRAWN", u32::from(plan.horizon() || matches!(scene.sky, Sky::LatLong { .. }))),
                     ("HAS_SUN", u32::from(plan.sun)),
                     ("SHADOWED", u32::from(plan.cascades > 0)),
+                    ("INDIRECT", u32::from(plan.indirect > 0)),
+                    ("INDIRECT_NODES", plan.indirect.max(2)),
                     ("VIEW_MODE", plan.view_mode as u32),
                 ],
             )?,
@@ -102,7 +104,7 @@ impl SeenGround {
         targets: &ImageTargets,
     ) {
         let Some(quads_seen) = &targets.quads else { return };
-        let (tiles, nodes) = self.none.or(forest);
+        let (tiles, [nodes, indirect]) = self.none.or(forest);
         recorder.compute(pass::GROUND, |pass| {
             let more = targets.shown();
             let all = [
@@ -113,6 +115,7 @@ impl SeenGround {
                 ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
                 ("cover_tiles", Resource::Texture(tiles, Sampler::Trilinear)),
                 ("nodes", Resource::Texels(nodes)),
+                ("indirect", Resource::Texels(indirect)),
                 // Without trees nothing of it is read.
                 ("trees_seen", Resource::Texels(trees_seen.unwrap_or(&terrain.quads))),
                 ("depth", Resource::Texture(targets.depth.drawn(), Sampler::Nearest)),

@@ -7,6 +7,7 @@ use super::shadows::{CastingTrees, Shadows};
 use super::sky::SkyPass;
 use super::trees::shader_map::ShaderMap;
 use crate::bake::Baked;
+use crate::forest::indirect::IndirectData;
 use crate::forest::casters::CasterData;
 use crate::forest::coverage::CoverageData;
 use crate::forest::cull::CullData;
@@ -23,6 +24,8 @@ use crate::{Error, Result};
 
 /// What lives between frames for the trees; absent from scenes without.
 pub struct Forest {
+    /// What leaves, bark and ground hand to each other.
+    pub indirect: IndirectData,
     /// Seeds.
     pub seeds: SeedData,
     /// Coverage tiles.
@@ -71,6 +74,7 @@ impl Forest {
         terrain: &TerrainData,
     ) -> Result<Self> {
         let species = SpeciesData::new(gpu, scene, plan, baked)?;
+        let indirect = IndirectData::new(gpu, plan, baked)?;
         let tables: Vec<_> = baked.iter().map(|b| b.tables.as_ref()).collect();
         let tables = TableData::new(gpu, plan.tables()?, &tables)?;
         let near = || -> Result<NearTrees> {
@@ -85,6 +89,7 @@ impl Forest {
             coverage: CoverageData::new(gpu, scene, plan, &species, &terrain.tree)?,
             seeds: SeedData::new(gpu, scene, plan)?,
             near,
+            indirect,
             species,
             tables,
         })
@@ -142,10 +147,10 @@ impl World {
 
     /// Records which trees the camera sees.
     pub fn visibility(&self, recorder: &mut Recorder) {
-        if let Some(Forest { seeds, species, tables, near: Some(NearTrees { cull, .. }), .. }) = &self.forest
+        if let Some(Forest { seeds, species, tables, indirect, near: Some(NearTrees { cull, .. }), .. }) = &self.forest
         {
             recorder.stage("visibility", |r| {
-                cull.record(r, &self.view, seeds, species, tables, &self.terrain);
+                cull.record(r, &self.view, seeds, species, (tables, indirect), &self.terrain);
             });
         }
     }
@@ -193,7 +198,7 @@ impl World {
 /// # Errors
 /// [`Error::Usage`] with what differs, or does not suffice.
 pub(super) fn served(scene: &Scene, held: &Plan, wanted: &Plan) -> Result<Plan> {
-    let same = |a: &Plan, b: &Plan| -> [(&str, bool); 9] {
+    let same = |a: &Plan, b: &Plan| -> [(&str, bool); 10] {
         let grid = |p: &Plan| [p.quad_side, p.tile_side, p.pattern_density, p.plain_side].map(f64::to_bits);
         [
             ("ladder", a.ladder == b.ladder),
@@ -203,6 +208,7 @@ pub(super) fn served(scene: &Scene, held: &Plan, wanted: &Plan) -> Result<Plan> 
             ("trees one by one", (a.z_fields, a.transfer_bands) == (b.z_fields, b.transfer_bands)),
             ("meshes", a.meshes == b.meshes),
             ("tables", a.pair_tables == b.pair_tables),
+            ("indirect light", a.indirect == b.indirect),
             ("sun", (a.sun, a.cascades) == (b.sun, b.cascades)),
             ("seed quads", grid(a) == grid(b) && a.region_capacity == b.region_capacity),
         ]

@@ -5,6 +5,7 @@ pub mod crown;
 pub mod forest;
 pub mod handover;
 pub mod hash;
+pub mod indirect;
 pub mod leaf;
 pub mod lift;
 pub mod light;

@@ -7,6 +7,7 @@ use super::tiles::Rasterizer;
 use crate::gpu::interface as gpu;
 use crate::gpu::{BufferDesc, Description, ImageDesc, VolumeDesc, vk};
 use crate::land::density::density_map_size;
+use crate::physics::indirect::{COEFFICIENTS, GROUND};
 use crate::physics::outline::ROWS as OUTLINE_ROWS;
 use crate::physics::views;
 use crate::scene::{Albedo, Scene, Sky};
@@ -14,7 +15,7 @@ use crate::scene::{Albedo, Scene, Sky};
 /// Format and bytes of the texels as which nodes of the shader-map are read.
 pub const NODE_TEXELS: (vk::Format, u64) = (vk::Format::R32G32B32A32_SFLOAT, 16);
 /// The same for records of trees.
-const TREE_TEXELS: (vk::Format, u64) = (vk::Format::R32G32B32A32_UINT, 16);
+pub const TREE_TEXELS: (vk::Format, u64) = (vk::Format::R32G32B32A32_UINT, 16);
 /// Four half floats.
 const HALVES: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
 /// Bytes of the six indices of a quad that shows a tree.
@@ -108,6 +109,27 @@ impl Plan {
             }
             let reason = format!("ground, skylight and trees of species \"{name}\" at any distance");
             items.shared("data", &format!("view tables of {name}"), reason, vec![views.into()], count);
+        }
+    }
+
+    /// Light that met more than one surface.
+    pub(super) fn list_indirect(&self, scene: &Scene, items: &mut Items) {
+        if self.indirect == 0 {
+            return;
+        }
+        let (species, nodes) = (scene.species.len(), self.indirect as usize);
+        let texels = nodes * (GROUND + species * (COEFFICIENTS - GROUND));
+        let described = |name, count: u64, texels: (vk::Format, u64)| BufferDesc {
+            texels: Some(texels),
+            ..BufferDesc::new(name, count * texels.1)
+        };
+        let nodes = described(resource::INDIRECT, texels as u64, NODE_TEXELS);
+        let reason = "light that met more than one surface, by density";
+        items.add("data", "indirect light", reason, [nodes]);
+        if self.z_fields {
+            let handed = described(resource::HANDED, u64::from(self.tree_capacity), TREE_TEXELS);
+            let reason = format!("the same of up to {} trees in a frame", self.tree_capacity);
+            items.add("target", "handed light", reason, [handed]);
         }
     }
 

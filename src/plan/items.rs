@@ -93,6 +93,7 @@ impl Plan {
         }
         if self.forest {
             self.list_tables(scene, &mut items);
+            self.list_indirect(scene, &mut items);
             self.list_distribution(scene, &mut items);
         }
         if self.z_fields {

@@ -21,7 +21,7 @@ use crate::ladder::Ladder;
 use crate::land::pattern::Pattern;
 use crate::scene::{Camera, Scene};
 
-pub use data::{NODE_TEXELS, QUAD_INDEX_BYTES, tables};
+pub use data::{NODE_TEXELS, QUAD_INDEX_BYTES, TREE_TEXELS, tables};
 pub use items::Item;
 pub use meshes::envelope_words;
 pub use tiles::{Drawing, Rasterizer, TILE_STEPS, TileBuffer, TileBuffers};
@@ -104,6 +104,8 @@ pub struct Plan {
     pub pair_tables: bool,
     /// Bands of light transfer: how well texels of trees that are drawn one by one know from where the sun reaches them.
     pub transfer_bands: u32,
+    /// Nodes of the density at which light that met more than one surface is known; 0 where it is left out.
+    pub indirect: u32,
     /// Shadow cascades; 0 without sun, and where average light, which includes its shadows, is all that there is.
     pub cascades: u32,
     /// Distance that the cascades reach, m.
@@ -213,6 +215,9 @@ impl Plan {
             plan.seeds(scene, eye, device);
             plan.coverage(scene, eye, device);
             plan.pair_tables = plan.sun && ladder.averages();
+            if scene.settings.indirect > 0 {
+                plan.indirect = scene.settings.table_densities;
+            }
             plan.z_fields =
                 std::iter::once(&eye.position).chain(places).any(|p| plan.scene_in_range(scene, *p));
             plan.meshes = plan.z_fields
@@ -256,6 +261,7 @@ impl Plan {
             meshes: false,
             leaf_side: 0.0,
             pair_tables: false,
+            indirect: 0,
             transfer_bands: 0,
             cascades: if scene.sun.shines() { s.cascades } else { 0 },
             shadow_distance: 0.0,

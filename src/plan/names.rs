@@ -112,6 +112,10 @@ pub mod resource {
     pub const PAIR_TABLES: &str = "pair tables";
     /// View tables of all species.
     pub const VIEW_TABLES: &str = "view tables";
+    /// What leaves, bark and ground hand to each other of light, by density.
+    pub const INDIRECT: &str = "indirect light";
+    /// The same of each tree in view.
+    pub const HANDED: &str = "handed light";
     /// Corners of the meshes' triangles.
     pub const MESH_CORNERS: &str = "mesh corners";
     /// What the meshes' triangles are.

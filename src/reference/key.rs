@@ -3,7 +3,7 @@
 use bytemuck::NoUninit;
 
 use super::Options;
-use super::trees::Tree;
+use crate::bake::grove::Tree;
 use crate::camera::Eye;
 use crate::scene::{Albedo, Distribution, Scene, Sky};
 

@@ -56,7 +56,6 @@
 
 mod estimate;
 mod file;
-mod foliage;
 mod ground;
 mod key;
 mod path;

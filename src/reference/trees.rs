@@ -3,10 +3,10 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
-use super::foliage::Foliage;
+use crate::bake::grove::Tree;
 use crate::camera::{Bounds, Eye};
 use crate::land::candidate::{Candidate, Layout, listed};
 use crate::land::quadtree::Quadtree;
@@ -21,43 +21,6 @@ pub const MOST_TREES: usize = 4_000_000;
 const LIGHT_REACH: f64 = 6.0;
 /// Shadows are at most so many times as long as their casters are tall, as in the renderer.
 const LONGEST_SHADOW: f64 = 20.0;
-
-/// A tree of the world.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tree {
-    /// Base of the trunk, m from the world's origin.
-    pub base: Vec3,
-    /// Scale.
-    pub scale: f32,
-    /// Cosine and sine of the rotation, counterclockwise seen from above.
-    pub turn: [f32; 2],
-    /// Factor of its colours.
-    pub tint: f32,
-    /// Index of its species.
-    pub species: u32,
-}
-
-impl Tree {
-    /// A place in the world, from its origin, as the tree's mesh has it; directions likewise, without the base.
-    pub fn to_mesh(self, p: Vec3) -> Vec3 {
-        let ([c, s], inverse) = (self.turn, 1.0 / self.scale);
-        Vec3::new(c * p.x + s * p.y, c * p.y - s * p.x, p.z) * inverse
-    }
-
-    /// A direction of the mesh in the world, times the scale.
-    pub fn to_world(self, p: Vec3) -> Vec3 {
-        let [c, s] = self.turn;
-        Vec3::new(c * p.x - s * p.y, s * p.x + c * p.y, p.z) * self.scale
-    }
-
-    /// Bounds from the world's origin.
-    pub fn bounds(&self, foliage: &Foliage) -> (Vec3, Vec3) {
-        let (low, high) = foliage.bounds(self.turn);
-        // Rounding of the corners' turn.
-        let room = 1e-5 * self.scale * low.abs().max(high.abs()).max_element();
-        (self.base + low * self.scale - room, self.base + high * self.scale + room)
-    }
-}
 
 /// Trees around what some eyes see, and the origin that they are relative to: the middle of them.
 ///

@@ -4,19 +4,16 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::foliage::Foliage;
 use super::ground::Ground;
 use super::key::Key;
-use super::trees::{self, Tree};
+use super::trees;
 use crate::Result;
+use crate::bake::foliage::Foliage;
+use crate::bake::grove::Grove;
 use crate::camera::{Eye, Light};
-use crate::rays::{Hierarchy, Stack};
+use crate::rays::Stack;
 use crate::scene::{Scene, Sky};
 
-/// Rays leave a tree's surface at this part of the tree's size, against meeting it again.
-const LEAST_STEP: f64 = 1e-5;
-/// And at this part of their distance from the world's origin, for its coordinates are singles.
-const ROUNDING: f64 = 2.5e-7;
 /// Rays leave the ground at this height, m: far above the rounding of doubles, and so low that next to a crease hardly any
 /// starts under the other side of it.
 const GROUND_STEP: f64 = 1e-6;
@@ -24,9 +21,8 @@ const GROUND_STEP: f64 = 1e-6;
 /// A scene as light meets it: the species' own triangles on the renderer's own seeds, around what some eyes see.
 pub struct World {
     ground: Ground,
-    species: Vec<Foliage>,
-    trees: Vec<Tree>,
-    top: Hierarchy,
+    grove: Grove,
+    /// That of the grove.
     origin: DVec3,
     pub(super) light: Light,
     pub(super) sky: SkyLight,
@@ -62,15 +58,13 @@ impl World {
     pub fn new(scene: &Scene, eyes: &[Eye]) -> Result<Self> {
         let light = Light::new(scene);
         let (trees, origin) = trees::collect(scene, eyes, light.direction)?;
-        let species = scene.species.iter().map(Foliage::new).collect::<Result<Vec<_>>>()?;
-        let boxes: Vec<(Vec3, Vec3)> = trees.iter().map(|t| t.bounds(&species[t.species as usize])).collect();
+        let foliage = |s: &crate::scene::Species| Ok(Arc::new(Foliage::new(&s.mesh, &s.optics)?));
+        let species = scene.species.iter().map(foliage).collect::<Result<Vec<_>>>()?;
         Ok(World {
             ground: Ground::new(&scene.terrain),
-            top: Hierarchy::new(&boxes, 1, |tree| tree[0]),
             key: Key::of_world(scene, &trees),
+            grove: Grove::new(species, trees),
             sky: SkyLight::new(&scene.sky),
-            species,
-            trees,
             origin,
             light,
         })
@@ -78,19 +72,19 @@ impl World {
 
     /// The same with every tree in the mean colours of its species, which the renderer varies a little from tree to tree.
     pub fn without_tints(mut self) -> Self {
-        self.trees.iter_mut().for_each(|t| t.tint = 1.0);
+        self.grove.trees.iter_mut().for_each(|t| t.tint = 1.0);
         self.key.note("tints of trees", b"none");
         self
     }
 
     /// Number of trees.
     pub fn tree_count(&self) -> usize {
-        self.trees.len()
+        self.grove.trees.len()
     }
 
     /// Triangles of all species' meshes, each counted once.
     pub fn triangle_count(&self) -> usize {
-        self.species.iter().map(Foliage::triangles).sum()
+        self.grove.triangles()
     }
 
     /// The nearest surface along a ray.
@@ -121,25 +115,17 @@ impl World {
             return true;
         }
         let Some((_, o)) = self.to_trees(origin, direction) else { return false };
-        let d = direction.as_vec3();
-        let end = self.top.walk(o, d, f32::MAX, stack, |stack, k, t_max| {
-            let tree = &self.trees[k as usize];
-            let (o, d) = (tree.to_mesh(o - tree.base), tree.to_mesh(d));
-            if self.species[tree.species as usize].occludes(o, d, stack) { -1.0 } else { t_max }
-        });
-        end < 0.0
+        self.grove.occluded(o, direction.as_vec3(), stack)
     }
 
     /// Where a ray comes to the box of all trees: its parameter, and the place from the world's origin. Rays from far away
     /// keep their precision so.
     fn to_trees(&self, origin: DVec3, direction: DVec3) -> Option<(f64, Vec3)> {
-        if self.top.is_empty() {
-            return None;
-        }
+        let (lowest, highest) = self.grove.bounds()?;
         let o = origin - self.origin;
         let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
         for k in 0..3 {
-            let (low, high) = (f64::from(self.top.low[k]), f64::from(self.top.high[k]));
+            let (low, high) = (f64::from(lowest[k]), f64::from(highest[k]));
             if direction[k] == 0.0 {
                 if o[k] < low || o[k] > high {
                     return None;
@@ -155,46 +141,18 @@ impl World {
 
     fn nearest_tree(&self, origin: DVec3, direction: DVec3, end: f64, stack: &mut Stack) -> Option<Hit> {
         let (from, o) = self.to_trees(origin, direction).filter(|(from, _)| *from < end)?;
-        let d = direction.as_vec3();
-        let mut found = None;
         let limit = (end - from).min(f64::from(f32::MAX)) as f32;
-        self.top.walk(o, d, limit, stack, |stack, k, t_max| {
-            let tree = &self.trees[k as usize];
-            // The direction keeps its length in metres of the world, so t is the same in both.
-            let (o, d) = (tree.to_mesh(o - tree.base), tree.to_mesh(d));
-            match self.species[tree.species as usize].nearest(o, d, t_max, stack) {
-                Some(met) => {
-                    found = Some((k, met));
-                    met.t
-                }
-                None => t_max,
-            }
-        });
-        let (k, met) = found?;
-        let tree = &self.trees[k as usize];
-        let foliage = &self.species[tree.species as usize];
-        let point = (tree.base + tree.to_world(foliage.point(&met))).as_dvec3();
-        let normal = tree.to_world(foliage.normal(met.face)).as_dvec3().normalize();
-        let thin = foliage.is_leaf(met.face);
-        let colours = &foliage.colours;
-        let (mut r, mut t) = if thin {
-            (Vec3::from(colours.reflectance), Vec3::from(colours.transmittance))
-        } else {
-            (Vec3::from(colours.bark_reflectance), Vec3::ZERO)
-        };
-        // No tint makes a surface scatter more than it gets.
-        let tint = (Vec3::splat(tree.tint)).min((r + t).max(Vec3::splat(1e-6)).recip());
-        (r, t) = (r * tint, t * tint);
-        let size = f64::from(tree.scale * foliage.reach());
+        let (tree, met) = self.grove.nearest(o, direction.as_vec3(), limit, stack)?;
+        let leaf = self.grove.leaf(tree, &met, direction);
         Some(Hit {
             t: from + f64::from(met.t),
-            at: self.origin + point,
-            normal: if normal.dot(direction) > 0.0 { -normal } else { normal },
-            step: LEAST_STEP * size + ROUNDING * point.abs().max_element(),
-            reflectance: r,
-            transmittance: t,
-            species: Some(tree.species),
-            thin,
+            at: self.origin + leaf.point.as_dvec3(),
+            normal: leaf.normal,
+            step: leaf.step,
+            reflectance: leaf.reflectance,
+            transmittance: leaf.transmittance,
+            species: Some(leaf.species),
+            thin: leaf.thin,
         })
     }
 }

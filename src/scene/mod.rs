@@ -14,6 +14,7 @@ pub mod texture;
 use std::sync::Arc;
 
 use crate::ladder::Ladder;
+use crate::physics::tonemap;
 use crate::physics::light::sun_disc_fraction;
 use crate::physics::raster::Raster;
 use crate::physics::terrain::height_and_slope;
@@ -85,6 +86,22 @@ impl Terrain {
             let limit = |v: f64, n: u32| (v / self.cell_size).clamp(0.0, f64::from(n - 1));
             height_and_slope(raster, limit(x, raster.width), limit(y, raster.height))[0]
         })
+    }
+
+    /// Mean reflectance, linear RGB.
+    pub fn mean_albedo(&self) -> [f32; 3] {
+        match &self.albedo {
+            Albedo::Uniform(rgb) => *rgb,
+            Albedo::Image(t) => {
+                let linear: Vec<f64> =
+                    (0..=255).map(|k| tonemap::linear(f64::from(k) / 255.0)).collect();
+                let mut sum = [0.0; 3];
+                for pixel in t.rgba.chunks_exact(4) {
+                    (0..3).for_each(|c| sum[c] += linear[pixel[c] as usize]);
+                }
+                sum.map(|s| (s / f64::from((t.width * t.height).max(1))) as f32)
+            }
+        }
     }
 }
 

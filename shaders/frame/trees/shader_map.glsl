@@ -10,10 +10,14 @@
 #include "physics/forest.glsl"
 #include "physics/handover.glsl"
 #include "physics/strata.glsl"
+#include "physics/indirect.glsl"
 
 layout(binding = 8) uniform sampler3D pair_table;
 layout(binding = 9) uniform sampler2DArray view_table;
 layout(std140, binding = 10) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
+layout(binding = 11) uniform samplerBuffer indirect;
+layout(constant_id = 6) const bool INDIRECT = false;
+layout(constant_id = 7) const int INDIRECT_FIRST = 0; // texel where the first species' begins
 layout(constant_id = 2) const uint SPECIES_COUNT = 0u;
 layout(constant_id = 3) const float TABLE_ANGLES = 16.0;
 layout(constant_id = 4) const float TABLE_DENSITIES = 8.0;
@@ -55,6 +59,7 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
     }
     if (mixed) strata(layers, SPECIES_COUNT, strata_seen);
     float weights = 0.0;
+    vec3 handed_sun = vec3(0.0);
     for (uint k = 0u; k < SPECIES_COUNT; k++) {
         Species s = species.items[k];
         float x = thickness[k], share = x / total;
@@ -89,6 +94,15 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         weights += weight;
         vec3 leaf = (0.5 * sky_over_slope(n.z, known.sky)) * s.albedo * view.v.sky_radiance;
         f.tree_sky += weight * leaf * (t.sky.x + t.sky.y * s.bark_ratio);
+        if (INDIRECT) {
+            vec3 l = view.v.sun_direction;
+            int base = INDIRECT_FIRST + int(k) * int(TABLE_DENSITIES) * INDIRECT_NODE;
+            IndirectAt at = indirect_at(total, texelFetch(indirect, 0).w, int(TABLE_DENSITIES));
+            f.tree_sky += weight * indirect_far_sky(indirect, base, at, v.z) * view.v.sky_radiance;
+            if (PAIR_TABLES) {
+                handed_sun += (weight * sun_facing(l, n)) * indirect_far_sun(indirect, base, at, v.z, l.z, dot(v, l)) * view.v.sun_irradiance;
+            }
+        }
         if (PAIR_TABLES) {
             f.joint += share * t.joint;
             vec3 lit = turned_reflectance(s.reflectance, s.turning, angle_between(v, view.v.sun_direction));
@@ -99,7 +113,7 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         }
     }
     float inverse = 1.0 / weights;
-    f.tree_sun *= inverse * hotspot(v, view.v.sun_direction, view.v.hotspot_amplitude, view.v.hotspot_width);
+    f.tree_sun = inverse * (f.tree_sun * hotspot(v, view.v.sun_direction, view.v.hotspot_amplitude, view.v.hotspot_width) + handed_sun);
     f.tree_sky *= inverse;
     f.tree_lit *= inverse;
     f.converged /= f.seen;

@@ -1,4 +1,4 @@
-// Light on what is seen of a z-field tree (BN12, section 5). Needs physics/{light,correction,zfield,shadow,transfer}.glsl.
+// Light on what is seen of a z-field tree (BN12, section 5). Needs physics/{light,correction,zfield,shadow,transfer,indirect}.glsl.
 
 // What is the same all over a tree.
 struct TreeLight {
@@ -20,6 +20,7 @@ struct TreeLight {
     float transfer;     // strength of light transfer
     uint cascade;       // for shadow lookups; MAX_CASCADES: none
     uint name;          // in the shadow maps
+    uvec4 handed;       // light that met more than one surface: the sun's, the sky's
 };
 
 // The ray from a seen point to the sun.
@@ -36,6 +37,7 @@ struct LightRay {
 // What is asked of the light.
 struct LightQuality {
     bool sun;           // it shines
+    bool indirect;      // light that met more than one surface counts
     int iterations;     // to where its light enters the crown
     uint bands;         // of light transfer
 };
@@ -98,5 +100,10 @@ TreeParts tree_light(sampler2DArray views, sampler2DArray shadow_map, sampler2DA
     // Depth under the top of the canopy, for the sky through the hole around the tree.
     float below_top = max(1.0 - height, 0.0) * t.half_height;
     light.sky += t.sky * colour * (at.occlusion / (1.0 + below_top * below_top * t.hole));
+    if (quality.indirect) {
+        vec3 bark = mix(t.bark_ratio, vec3(1.0), smoothstep(t.bare_below - 0.05, t.bare_below + 0.05, height));
+        light.sun += handed_at(t.handed.xy, height) * bark;
+        light.sky += handed_at(t.handed.zw, height) * bark;
+    }
     return light;
 }

@@ -6,6 +6,7 @@
 #include "physics/zfield.glsl"
 #include "physics/shadow.glsl"
 #include "physics/transfer.glsl"
+#include "physics/indirect.glsl"
 #include "frame/trees/zfield_light.glsl"
 
 layout(location = 0) in vec4 view_p[3];
@@ -24,6 +25,7 @@ layout(location = 22) flat in vec4 own; // dither, c of the self-shadow times th
 layout(location = 23) flat in vec4 bark_ratio;
 layout(location = 24) flat in vec4 mean_sun;
 layout(location = 25) flat in vec4 mean_sky;
+layout(location = 27) flat in uvec4 handed;
 layout(location = 26) flat in vec4 sun_from; // in the tree's own axes; w: strength of light transfer
 
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
@@ -38,6 +40,7 @@ layout(constant_id = 5) const int LIGHT_ITERATIONS = 1;
 layout(constant_id = 6) const bool HAS_SUN = true;
 layout(constant_id = 8) const bool CONVERGED = false; // to the average light: nothing of the tree's own is left
 layout(constant_id = 9) const uint TRANSFER_BANDS = 0u;
+layout(constant_id = 10) const bool INDIRECT = false;
 
 // Returns the species, counted from 1. Sets sample mask and depth. `lit` is the fraction of the sun that arrives.
 uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
@@ -62,6 +65,11 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
     sky_part = mean_sky.rgb;
     lit = HAS_SUN ? mean_sky.w : 0.0;
     uint species = (tree_bits.w >> 5u & 7u) + 1u;
+    float height = mix(view_p[0].w, optics.w, s);
+    if (CONVERGED && INDIRECT) {
+        sun_part += handed_at(handed.xy, height);
+        sky_part += handed_at(handed.zw, height);
+    }
     if (CONVERGED) return species;
     LightRay ray;
     for (int i = 0; i < 3; i++) {
@@ -75,9 +83,9 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
     ray.turn = view.v.cascade_turn[min(tree_bits.w & 15u, MAX_CASCADES - 1u)].xy;
     TreeLight tree = TreeLight(sun.rgb, own.w, sky.rgb, mean_sun.rgb, mean_sky.rgb, mean_sky.w, mean_sun.w,
                                vec2(own.z, unpackHalf2x16(tree_bits.w).y), bark_ratio.rgb, bark_ratio.w, sky.w,
-                               sun.w, own.y, optics.y, sun_from.xyz, sun_from.w, tree_bits.w & 15u, tree_bits.w >> 8u & 255u);
+                               sun.w, own.y, optics.y, sun_from.xyz, sun_from.w, tree_bits.w & 15u, tree_bits.w >> 8u & 255u, handed);
     TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, tree, at, p, d, layers, below, optics.x, MAGNIFIED, s,
-                                 mix(view_p[0].w, optics.w, s), ray, LightQuality(HAS_SUN, LIGHT_ITERATIONS, TRANSFER_BANDS));
+                                 height, ray, LightQuality(HAS_SUN, INDIRECT, LIGHT_ITERATIONS, TRANSFER_BANDS));
     sun_part = parts.sun;
     sky_part = parts.sky;
     lit = parts.lit;

@@ -17,6 +17,7 @@ mod trace;
 
 pub use crown::{Cast, CrownModel, LeafOptics, Seen, TransferAt};
 pub use field::{FieldAim, FieldCrown};
+pub(super) use patch::Patch;
 pub use store::{key, load_or_measure, path};
 
 use crate::bake::SpeciesBake;

@@ -1,6 +1,7 @@
 //! The shader-map pass: forest fractions and radiances from the tables, at every second vertex of the terrain (BN12, section 6).
 
 use crate::Result;
+use crate::forest::indirect::IndirectData;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
 use crate::frame::Forest;
 use crate::gpu::{Buffer, Gpu, Program, Recorder, Resource, Sampler, shaders};
@@ -31,6 +32,8 @@ impl ShaderMap {
                     ("TABLE_ANGLES", float(forest.tables.angles)),
                     ("TABLE_DENSITIES", float(forest.tables.densities)),
                     ("PAIR_TABLES", u32::from(plan.pair_tables)),
+                    ("INDIRECT", u32::from(plan.indirect > 0)),
+                    ("INDIRECT_FIRST", IndirectData::first_species(plan)),
                 ],
             )?,
         })
@@ -59,6 +62,7 @@ impl ShaderMap {
                     ("nodes", Resource::Buffer(&self.nodes)),
                     ("pair_table", Resource::Texture(&forest.tables.pairs, Sampler::Linear)),
                     ("view_table", Resource::Texture(&forest.tables.views, Sampler::Linear)),
+                    ("indirect", Resource::Texels(&forest.indirect.nodes)),
                     ("species", Resource::Buffer(&forest.species.table)),
                 ],
             );

@@ -127,6 +127,7 @@ impl TreeTiles {
                     ("LIGHT_ITERATIONS", if plan.sun { s.light_iterations } else { 0 }),
                     ("HAS_SUN", u32::from(plan.sun)),
                     ("TRANSFER_BANDS", plan.transfer_bands),
+                    ("INDIRECT", u32::from(plan.indirect > 0)),
                     ("VIEW_MODE", plan.view_mode as u32),
                 ],
             )?,
@@ -246,6 +247,7 @@ impl TreeTiles {
                 ("ranked", Resource::Texels(&self.ranked)),
                 ("bases", Resource::Texels(&forest.species.bases)),
                 ("seen", Resource::Texels(&self.seen)),
+                ("handed_light", Resource::Texels(&forest.indirect.handed)),
                 ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
             ];
             pass.bind(&self.shade, &[&all[..], &forest.species.lit(), &shown].concat());

@@ -42,6 +42,7 @@ impl Trees {
                 ("MAGNIFIED", u32::from(magnified)),
                 ("CONVERGED", u32::from(converged)),
                 ("TRANSFER_BANDS", plan.transfer_bands),
+                ("INDIRECT", u32::from(plan.indirect > 0)),
             ];
             if plan.view_mode != ViewMode::Radiance {
                 constants.push(("VIEW_MODE", plan.view_mode as u32));
@@ -91,6 +92,7 @@ impl Trees {
                 ("lists", Resource::Buffer(&cull.lists)),
                 ("bases", Resource::Buffer(&forest.species.bases)),
                 ("masks", Resource::Buffer(&forest.species.masks)),
+                ("handed_light", Resource::Buffer(&forest.indirect.handed)),
                 ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
             ];
             let bound = [&bound[..], &forest.species.lit()].concat();

@@ -4,6 +4,7 @@
 #include "physics/light.glsl"
 #include "physics/shadow.glsl"
 #include "physics/leaf.glsl"
+#include "physics/indirect.glsl"
 #include "frame/trees/zfield_space.glsl"
 #include "frame/surfaces_seen.glsl"
 #include "frame/trees/meshes/corner.glsl"
@@ -27,12 +28,14 @@ layout(binding = 8) uniform usamplerBuffer envelopes;
 layout(std140, binding = 9) uniform Leaves { vec4 items[2u * 26u]; } rule;
 layout(std140, binding = 12) uniform Optics { vec4 items[3u * MAX_SPECIES]; } optics; // of each species: reflectance and transmittance of leaves, bark
 layout(binding = 13) uniform sampler2DArray shadow_map;
+layout(binding = 15) uniform usamplerBuffer handed_light;
 layout(binding = 14) uniform samplerBuffer hiding;    // of each direction, HIDING_STEPS pairs
 layout(push_constant) uniform Push { MeshLightParameters p; };
 layout(constant_id = 0) const uint SAMPLES = 4u;
 layout(constant_id = 1) const bool HAS_SUN = true;
 layout(constant_id = 2) const uint LEAF_DIRECTIONS = 26u;
 layout(constant_id = 3) const int LEAF_POWER = 6;
+layout(constant_id = 4) const bool INDIRECT = false;
 
 // What the crown leaves of sky and sun at a triangle of unit normal n, all in the tree's own axes; and of the sky, what the trees around leave
 // of thickness `around`, at a height above the ground in metres (src/bake/hiding.rs).
@@ -79,7 +82,8 @@ float sun_left(Tree t, Species kind, vec3 world, vec3 n, float own) {
 // What a triangle shows to a pixel, at a place of the world from the camera.
 Shown shade(uint what, vec3 world) {
     View v = view.v;
-    Tree t = fetch_tree(trees, mesh_trees.items[seen_tree(what)]);
+    uint index = mesh_trees.items[seen_tree(what)];
+    Tree t = fetch_tree(trees, index);
     Species kind = species.items[t.species];
     uint face = draws.items[t.species].first_face + seen_triangle(what);
     mat3 back = tree_rotation(t);
@@ -100,6 +104,13 @@ Shown shade(uint what, vec3 world) {
         float visible = sun_left(t, kind, world, rotated(t.turn, n), light.sun);
         lit_part = min(own.x * visible + lit.x, 1.0);
         sun_part += (own.x * visible * tint_of(t)) * leaf_sun(reflectance, transmittance, n, viewer, sun) * v.sun_irradiance;
+    }
+    if (INDIRECT) {
+        uvec4 handed = texelFetch(handed_light, int(index));
+        float middle = (back * (world - t.centre)).z / (kind.scale_to_metres.z * t.scale);
+        vec3 of_leaves = leaf ? vec3(1.0) : kind.bark_ratio;
+        sun_part += handed_at(handed.xy, middle) * of_leaves;
+        sky_part += handed_at(handed.zw, middle) * of_leaves;
     }
 #ifdef LAYERS
     return Shown(vec4(sun_part, 1.0), vec4(sky_part, 1.0), vec4(0.0, 0.0, lit_part, 1.0 - lit_part));

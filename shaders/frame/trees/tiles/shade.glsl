@@ -9,6 +9,7 @@
 #include "physics/zfield.glsl"
 #include "physics/shadow.glsl"
 #include "physics/transfer.glsl"
+#include "physics/indirect.glsl"
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/zfield_light.glsl"
 #include "frame/camera.glsl"
@@ -29,12 +30,14 @@ layout(binding = 8) uniform sampler2DArray views;
 layout(binding = 9) uniform sampler2DArray shadow_map;
 layout(binding = 10) uniform sampler2DArray transfer_1;
 layout(binding = 11) uniform sampler2DArray transfer_2;
+layout(binding = 12) uniform usamplerBuffer handed_light;
 layout(push_constant) uniform Push { TileParameters p; };
 layout(constant_id = 0) const uint SAMPLES = 4u;
 layout(constant_id = 1) const uint ESTIMATES = 1u;
 layout(constant_id = 2) const int LIGHT_ITERATIONS = 1;
 layout(constant_id = 3) const bool HAS_SUN = true;
 layout(constant_id = 4) const uint TRANSFER_BANDS = 0u;
+layout(constant_id = 5) const bool INDIRECT = false;
 
 // What a tree shows to a pixel that sees it, and how deep; `offset` is the pixel's from the image's centre.
 Shown shade(uint rank, vec2 offset, out float depth) {
@@ -85,9 +88,9 @@ Shown shade(uint rank, vec2 offset, out float depth) {
     vec2 hole = unpackHalf2x16(t.hole_change), own = unpackHalf2x16(t.own_lit), lit = unpackHalf2x16(t.mean_lit_change);
     TreeLight light = TreeLight(t.sun, hole.y, t.sky, t.mean_sun, t.mean_sky, lit.x, own.x, vec2(own.y, lit.y), kind.bark_ratio,
                                 kind.bare_below, plane.half_extent.z, hole.x, kind.leaf_shadow * root, kind.extinction * phase_angle / t.scale, toward,
-                                transfer_strength(root), cascade_of(t), caster_name(t.identity));
+                                transfer_strength(root), cascade_of(t), caster_name(t.identity), INDIRECT ? texelFetch(handed_light, int(who & 0x3fffffffu)) : uvec4(0u));
     TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, light, surface, at, to, layers, below, t.mip, magnified,
-                                 s, found.z, ray, LightQuality(HAS_SUN, LIGHT_ITERATIONS, TRANSFER_BANDS));
+                                 s, found.z, ray, LightQuality(HAS_SUN, INDIRECT, LIGHT_ITERATIONS, TRANSFER_BANDS));
 #ifdef LAYERS
     return Shown(vec4(parts.sun, 1.0), vec4(parts.sky, 1.0), vec4(0.0, 0.0, parts.lit, 1.0 - parts.lit));
 #else

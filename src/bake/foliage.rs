@@ -4,11 +4,11 @@ use std::collections::HashSet;
 
 use glam::{Vec2, Vec3};
 
+use super::optics::{Colours, colours};
+use super::surface::Surface;
 use crate::Result;
-use crate::bake::optics::{Colours, colours};
-use crate::bake::surface::Surface;
 use crate::rays::{Met, Stack, Triangles};
-use crate::scene::Species;
+use crate::scene::{Mesh, OpticsOverride};
 
 /// A species: its mesh in a hierarchy, and its reflectances.
 #[derive(Clone, Debug)]
@@ -30,10 +30,9 @@ impl Foliage {
     ///
     /// # Errors
     /// [`crate::Error::Usage`] for a mesh without extent.
-    pub fn new(species: &Species) -> Result<Self> {
-        let mesh = &species.mesh;
+    pub fn new(mesh: &Mesh, optics: &OpticsOverride) -> Result<Self> {
         let mut surface = Surface::new(mesh)?;
-        let colours = colours(mesh, &surface, &species.optics);
+        let colours = colours(mesh, &surface, optics);
         // A card modelled as two triangles, one for each side, is one leaf.
         let mut seen = HashSet::new();
         surface.faces.retain(|f| {

@@ -1,0 +1,488 @@
+//! Light that met more than one surface ([`crate::physics::indirect`]), measured by paths through a forest of a species' meshes.
+//!
+//! Rays from random directions meet a tree that stands among others, and from there paths go on as light came: at every surface but the
+//! first they ask for the sun, and what leaves for the sky without meeting another surface counts for that. The ground is level, with the scene's
+//! mean reflectance. What a path brings, per irradiance of a sun in a random place, is a sample of L at this view, sun and height;
+//! coefficients are what makes Σ (L − Σ c Y)² least. A path's light varies by about twice its mean, and 65,536 rays for
+//! `table_rays` = 2048, of which four tenths meet the tree, leave less than two hundredths of it to each of fifteen coefficients.
+
+use std::f64::consts::{FRAC_1_PI, PI, TAU};
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::foliage::Foliage;
+use super::grove::{Grove, Tree};
+use super::least_squares;
+use super::tables::{ForestSettings, Patch, mean_area};
+use crate::Result;
+use crate::physics::crown::Crown;
+use crate::physics::hash::{Stream, hash2};
+use crate::physics::indirect::{
+    Angles, COEFFICIENTS, Indirect, NEAR_SKY, NEAR_SUN, SKY_TERMS, SUN_TERMS, near_sky_terms,
+    near_sun_terms, sky_terms, sun_terms,
+};
+use crate::physics::tables::density_node;
+use crate::physics::views::Basis;
+use crate::progress::Progress;
+use crate::rays::Stack;
+use crate::scene::{Mesh, OpticsOverride};
+
+/// Rays at every density to one of the knob `table_rays`.
+const RAYS: u32 = 32;
+/// Of these one in so many leaves the ground.
+const GROUND_RAYS: u32 = 4;
+/// Rays of a random stream; streams are the unit of work.
+const CHUNK: u32 = 512;
+/// Places in the forest at every density.
+const PLACES: u32 = 8;
+/// Trees stand around such a place as far as so many heights of the tallest, and no more than so many.
+const AROUND: f64 = 8.0;
+const MOST: f64 = 1500.0;
+/// Surfaces before Russian roulette begins, and after which a path ends.
+const SURE: u32 = 2;
+const LONGEST: u32 = 64;
+/// Rays leave the ground at this height, m.
+const GROUND_STEP: f64 = 1e-4;
+/// Viewers who look down more steeply than this cosine are above the forest; others see what nothing hides for so many of the
+/// tree's heights.
+const STEEP: f64 = 0.15;
+const NEAR: f64 = 2.0;
+/// Seeds.
+const SEED: u32 = 0x1d1;
+
+/// A species of a forest.
+#[derive(Clone, Debug)]
+pub struct Kind<'a> {
+    /// The model.
+    pub mesh: &'a Mesh,
+    /// What the scene says of its reflectances.
+    pub optics: &'a OpticsOverride,
+    /// Its crown.
+    pub crown: Crown,
+    /// What bark sends of what leaves would in its place, linear RGB.
+    pub bark_ratio: [f32; 3],
+    /// Trees of it per m² where the forest is densest.
+    pub density: f64,
+    /// Range of uniformly distributed scales.
+    pub scale: [f32; 2],
+}
+
+/// A forest: what stands around each of its trees.
+#[derive(Clone, Debug)]
+pub struct Mix<'a> {
+    /// Its species, which thin out together.
+    pub kinds: Vec<Kind<'a>>,
+    /// Reflectance of the ground, linear RGB.
+    pub ground: [f32; 3],
+    /// Nodes of the density, and what the knob `table_rays` says.
+    pub nodes: u32,
+    /// See there.
+    pub rays: u32,
+    /// Poisson points (for species with listed positions) instead of the Wang pattern.
+    pub poisson: bool,
+}
+
+impl Mix<'_> {
+    /// Trees per m² where it is densest.
+    fn density(&self) -> f64 {
+        self.kinds.iter().map(|k| k.density).sum()
+    }
+
+    /// x = λA there, of all species.
+    pub fn thickness(&self) -> f64 {
+        self.kinds.iter().map(|k| k.density * mean_area(&k.crown, k.scale)).sum()
+    }
+}
+
+/// A surface on a path.
+struct Met {
+    at: DVec3,
+    normal: DVec3,
+    step: f64,
+    reflectance: Vec3,
+    transmittance: Vec3,
+    thin: bool,
+}
+
+/// Trees around the origin, on level ground.
+struct Place {
+    grove: Grove,
+    ground: Vec3,
+}
+
+impl Place {
+    /// The nearest surface on a ray.
+    fn nearest(&self, from: DVec3, direction: DVec3, stack: &mut Stack) -> Option<Met> {
+        let end = if direction.z < 0.0 { (-from.z / direction.z).max(0.0) } else { f64::from(f32::MAX) };
+        let limit = end.min(f64::from(f32::MAX)) as f32;
+        if let Some((tree, met)) =
+            self.grove.nearest(from.as_vec3(), direction.as_vec3(), limit, stack)
+        {
+            return Some(self.leaf(tree, &met, direction));
+        }
+        (direction.z < 0.0).then(|| Met {
+            at: (from + direction * end).with_z(0.0),
+            normal: DVec3::Z,
+            step: GROUND_STEP,
+            reflectance: self.ground,
+            transmittance: Vec3::ZERO,
+            thin: false,
+        })
+    }
+
+    fn leaf(&self, tree: u32, met: &crate::rays::Met, direction: DVec3) -> Met {
+        let leaf = self.grove.leaf(tree, met, direction);
+        Met {
+            at: leaf.point.as_dvec3(),
+            normal: leaf.normal,
+            step: leaf.step,
+            reflectance: leaf.reflectance,
+            transmittance: leaf.transmittance,
+            thin: leaf.thin,
+        }
+    }
+
+    /// Whether a way up is free.
+    fn open(&self, from: DVec3, direction: DVec3, stack: &mut Stack) -> bool {
+        direction.z > 0.0 && !self.grove.occluded(from.as_vec3(), direction.as_vec3(), stack)
+    }
+
+    /// Whether nothing is on a way of so many metres.
+    fn free(&self, from: DVec3, direction: DVec3, metres: f64, stack: &mut Stack) -> bool {
+        self.grove.nearest(from.as_vec3(), direction.as_vec3(), metres as f32, stack).is_none()
+    }
+
+    /// Radiance that a surface sends where a path came from, per irradiance of the sun, straight from it.
+    fn sent(&self, met: &Met, sun: DVec3, stack: &mut Stack) -> Vec3 {
+        let cosine = met.normal.dot(sun);
+        let scattered = if cosine > 0.0 { met.reflectance } else { met.transmittance };
+        let from = met.at + met.normal * met.step.copysign(cosine);
+        if scattered != Vec3::ZERO && self.open(from, sun, stack) {
+            scattered * (cosine.abs() * FRAC_1_PI) as f32
+        } else {
+            Vec3::ZERO
+        }
+    }
+
+    /// Light that a surface sends where a path came from, after it met others: of a sun of irradiance 1, and of a sky of radiance 1.
+    fn handed(&self, first: Met, sun: DVec3, stream: &mut Stream, stack: &mut Stack) -> [Vec3; 2] {
+        let (mut met, mut weight) = (first, Vec3::ONE);
+        let mut light = [Vec3::ZERO; 2];
+        for surface in 0..LONGEST {
+            if surface > 0 {
+                light[0] += weight * self.sent(&met, sun, stack);
+            }
+            let Some((from, away)) = scattered(&met, &mut weight, surface >= SURE, stream) else { break };
+            match self.nearest(from, away, stack) {
+                Some(next) => met = next,
+                None => {
+                    light[1] += if surface > 0 && away.z > 0.0 { weight } else { Vec3::ZERO };
+                    break;
+                }
+            }
+        }
+        light
+    }
+}
+
+/// Where a path goes on from a surface; `None` where it ends. Its weight becomes that of what it will meet.
+fn scattered(met: &Met, weight: &mut Vec3, may_end: bool, stream: &mut Stream) -> Option<(DVec3, DVec3)> {
+    let (reflected, passed) = (*weight * met.reflectance, *weight * met.transmittance);
+    let (r, t) = (reflected.element_sum(), passed.element_sum());
+    if r + t <= 0.0 {
+        return None;
+    }
+    let chance = r / (r + t);
+    let through = stream.unit() as f32 >= chance;
+    *weight = if through { passed / (1.0 - chance) } else { reflected / chance };
+    if may_end {
+        // Twice the weight, so that the few bright paths are followed.
+        let sure = (2.0 * weight.max_element()).min(1.0);
+        if stream.unit() as f32 >= sure {
+            return None;
+        }
+        *weight /= sure;
+    }
+    let normal = if through { -met.normal } else { met.normal };
+    Some((met.at + normal * met.step, (normal + sphere(stream)).normalize_or(normal)))
+}
+
+/// A direction anywhere. A unit vector more than a normal has the density of the cosine to it.
+fn sphere(stream: &mut Stream) -> DVec3 {
+    let (z, turn) = (2.0 * stream.unit() - 1.0, TAU * stream.unit());
+    let r = (1.0 - z * z).sqrt();
+    DVec3::new(r * turn.cos(), r * turn.sin(), z)
+}
+
+/// A sun's direction, with a density of √z over the solid angle: neither low nor high ones are few.
+fn sun(stream: &mut Stream) -> DVec3 {
+    let (z, turn) = ((1.0 - 0.99 * stream.unit()).powf(2.0 / 3.0), TAU * stream.unit());
+    let r = (1.0 - z * z).sqrt();
+    DVec3::new(r * turn.cos(), r * turn.sin(), z)
+}
+
+/// Sums of a least-squares fit of N coefficients, linear RGB.
+#[derive(Clone, Copy)]
+struct Fit<const N: usize> {
+    h: [[[f64; N]; N]; 3],
+    y: [[f64; N]; 3],
+}
+
+impl<const N: usize> Default for Fit<N> {
+    fn default() -> Self {
+        Fit { h: [[[0.0; N]; N]; 3], y: [[0.0; N]; 3] }
+    }
+}
+
+impl<const N: usize> Fit<N> {
+    /// Adds a sample: `light` is to be `share` of what the terms say.
+    fn add(&mut self, terms: &[f64; N], share: Vec3, light: Vec3) {
+        for c in 0..3 {
+            let (share, light) = (f64::from(share[c]), f64::from(light[c]));
+            for i in 0..N {
+                for j in 0..=i {
+                    self.h[c][i][j] += share * share * terms[i] * terms[j];
+                }
+                self.y[c][i] += share * terms[i] * light;
+            }
+        }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.h.iter_mut().flatten().flatten().zip(other.h.iter().flatten().flatten()).for_each(|(a, b)| *a += b);
+        self.y.iter_mut().flatten().zip(other.y.iter().flatten()).for_each(|(a, b)| *a += b);
+    }
+
+    /// The coefficients; none where nothing was seen.
+    fn solve(self) -> [[f32; 3]; N] {
+        let of = |c: usize| {
+            let mut h = self.h[c];
+            // Worth a hundred-thousandth of the samples: only what they cannot tell stays 0.
+            let ridge = 1e-5 * h[0][0];
+            (0..N).for_each(|i| h[i][i] += ridge);
+            least_squares::solve(h, self.y[c], N).unwrap_or([0.0; N])
+        };
+        let rgb = [0, 1, 2].map(of);
+        std::array::from_fn(|i| std::array::from_fn(|c| rgb[c][i] as f32))
+    }
+}
+
+/// What is fitted at one density.
+#[derive(Clone, Copy, Default)]
+struct Fits {
+    /// What bark sends of what leaves would in its place.
+    bark: Vec3,
+    near_sun: Fit<NEAR_SUN>,
+    near_sky: Fit<NEAR_SKY>,
+    far_sun: Fit<SUN_TERMS>,
+    far_sky: Fit<SKY_TERMS>,
+    ground_sun: Fit<3>,
+    ground_sky: Fit<1>,
+}
+
+impl Fits {
+    fn merged(mut self, other: Fits) -> Fits {
+        self.near_sun.merge(&other.near_sun);
+        self.near_sky.merge(&other.near_sky);
+        self.far_sun.merge(&other.far_sun);
+        self.far_sky.merge(&other.far_sky);
+        self.ground_sun.merge(&other.ground_sun);
+        self.ground_sky.merge(&other.ground_sky);
+        self
+    }
+
+    fn solve(self) -> [[f32; 3]; COEFFICIENTS] {
+        let all = [
+            &self.near_sun.solve()[..],
+            &self.near_sky.solve(),
+            &self.far_sun.solve(),
+            &self.far_sky.solve(),
+            &self.ground_sun.solve(),
+            &self.ground_sky.solve(),
+        ]
+        .concat();
+        std::array::from_fn(|i| all[i])
+    }
+
+    /// A ray to the first tree of a place, from anywhere.
+    fn to_tree(&mut self, place: &Place, crown: &Crown, stream: &mut Stream, stack: &mut Stack) {
+        let (view, light) = (sphere(stream), sun(stream));
+        let (tree, frame) = (place.grove.trees[0], crown.frame);
+        let scale = frame.scale().as_dvec3();
+        let basis = Basis::new((view / scale).normalize());
+        let (a, b) = (2.0 * stream.unit() - 1.0, 2.0 * stream.unit() - 1.0);
+        let box_point = basis.right * a + basis.up * (b * basis.extent) + basis.w * 2.0;
+        let from = frame.to_metres(box_point.as_vec3()) * tree.scale;
+        // The box is that of the tree as it was modelled; around its trunk it is the same turned.
+        let Some(met) = place.grove.nearest_of(0, from, -view.as_vec3(), f32::MAX, stack) else { return };
+        let met = place.leaf(0, &met, -view);
+        let z = (met.at.z / f64::from(tree.scale) - f64::from(frame.centre)) / scale.z;
+        let angles = Angles { view: view.z, sun: light.z, between: view.dot(light) };
+        let above = met.at + met.normal * met.step;
+        let seen = view.z > 0.0 && place.open(above, view, stack);
+        let near = seen || (view.z < STEEP && place.free(above, view, NEAR * f64::from(crown.height), stack));
+        if !near {
+            return;
+        }
+        let share = if met.thin { Vec3::ONE } else { self.bark };
+        let [of_sun, of_sky] = place.handed(met, light, stream, stack);
+        self.near_sun.add(&near_sun_terms(angles, z), share, of_sun);
+        self.near_sky.add(&near_sky_terms(view.z, z), share, of_sky);
+        if seen {
+            self.far_sun.add(&sun_terms(angles), Vec3::ONE, of_sun);
+            self.far_sky.add(&sky_terms(view.z), Vec3::ONE, of_sky);
+        }
+    }
+
+    /// A ray from the ground, to what sends light there after it met a surface.
+    fn to_ground(&mut self, place: &Place, around: f64, stream: &mut Stream, stack: &mut Stack) {
+        let (up, light) = ((DVec3::Z + sphere(stream)).normalize_or(DVec3::Z), sun(stream));
+        let (r, turn) = (around * stream.unit().sqrt(), TAU * stream.unit());
+        let from = DVec3::new(r * turn.cos(), r * turn.sin(), GROUND_STEP);
+        let mut sums = [Vec3::ZERO; 2];
+        if up.z > 0.0
+            && let Some(met) = place.nearest(from, up, stack)
+        {
+            sums[0] = place.sent(&met, light, stack);
+            // What this surface has straight from the sky is light from trees as well.
+            let mut weight = Vec3::ONE;
+            let copy = Met { ..met };
+            if let Some((o, d)) = scattered(&met, &mut weight, false, stream)
+                && place.open(o, d, stack)
+            {
+                sums[1] = weight;
+            }
+            let [a, b] = place.handed(copy, light, stream, stack);
+            sums = [sums[0] + a, sums[1] + b];
+        }
+        self.ground_sun.add(&[1.0, light.z, light.z * light.z], Vec3::ONE, sums[0]);
+        self.ground_sky.add(&[1.0], Vec3::ONE, sums[1]);
+    }
+}
+
+/// Measures the light of a species of a forest, on all threads of the current rayon pool; the same bits for any number of them.
+///
+/// # Errors
+/// [`crate::Error::Usage`] for a mesh without extent.
+pub fn measure(mix: &Mix, species: usize, quiet: bool) -> Result<Indirect> {
+    let foliage = mix.kinds.iter().map(|k| Ok(Arc::new(Foliage::new(k.mesh, k.optics)?)));
+    let foliage = foliage.collect::<Result<Vec<_>>>()?;
+    let count = mix.nodes as usize;
+    let progress = Progress::new("measuring light between leaves", count as u64, quiet);
+    let nodes = (0..count)
+        .map(|j| {
+            let node = at_density((mix, &foliage), species, density_node(count, j, mix.density()), j as u32);
+            progress.step(1);
+            node
+        })
+        .collect();
+    progress.finish();
+    Ok(Indirect { max_thickness: mix.thickness() as f32, nodes })
+}
+
+/// The coefficients of a species at a density of all, trees per m².
+fn at_density(
+    (mix, foliage): (&Mix, &[Arc<Foliage>]),
+    species: usize,
+    density: f64,
+    node: u32,
+) -> [[f32; 3]; COEFFICIENTS] {
+    let heights = mix.kinds.iter().map(|k| f64::from(k.crown.height * k.scale[1]));
+    let tallest = heights.fold(0.0, f64::max);
+    let radius = (AROUND * tallest).min((MOST / (PI * density.max(1e-12))).sqrt());
+    let places: Vec<[Place; 2]> = (0..PLACES)
+        .into_par_iter()
+        .map(|k| {
+            let mut stream = Stream::new(hash2(SEED ^ node, k));
+            let forest = ForestSettings {
+                pattern_density: mix.density(),
+                poisson: mix.poisson,
+                ..ForestSettings::default()
+            };
+            let patch = Patch::of(&forest, k);
+            [Some(species), None].map(|about| {
+                let trees = standing(mix, (&patch, density / mix.density()), radius, about, &mut stream);
+                Place { grove: Grove::new(foliage.to_vec(), trees), ground: Vec3::from(mix.ground) }
+            })
+        })
+        .collect();
+    let (crown, bark) = (&mix.kinds[species].crown, Vec3::from(mix.kinds[species].bark_ratio));
+    let chunks = (mix.rays * RAYS).div_ceil(CHUNK).max(PLACES);
+    let parts: Vec<Fits> = (0..chunks)
+        .into_par_iter()
+        .map(|k| {
+            let [tree, ground] = &places[(k % PLACES) as usize];
+            let (mut stream, mut stack) = (Stream::new(hash2(SEED + 1 + node, k)), Stack::new());
+            let mut fits = Fits { bark, ..Fits::default() };
+            for _ in 0..CHUNK {
+                fits.to_tree(tree, crown, &mut stream, &mut stack);
+            }
+            for _ in 0..CHUNK / GROUND_RAYS {
+                fits.to_ground(ground, 0.25 * radius, &mut stream, &mut stack);
+            }
+            fits
+        })
+        .collect();
+    // One after the other: sums of the same bits whoever was first.
+    parts.into_iter().fold(Fits::default(), Fits::merged).solve()
+}
+
+/// Trees at the points of a patch up to `radius` m around a random place, as the grove's origin, or about one that is of the species `about`, and the
+/// first; at each other a tree stands with the chance `share`.
+fn standing(
+    mix: &Mix,
+    (patch, share): (&Patch, f64),
+    radius: f64,
+    about: Option<usize>,
+    stream: &mut Stream,
+) -> Vec<Tree> {
+    let side = f64::from(patch.side);
+    let place = |[x, y]: [f64; 2], species: usize, stream: &mut Stream| {
+        let (s, c) = (TAU * stream.unit()).sin_cos();
+        let [low, high] = mix.kinds[species].scale;
+        Tree {
+            base: Vec3::new(x as f32, y as f32, 0.0),
+            scale: low + (high - low) * stream.unit() as f32,
+            turn: [c as f32, s as f32],
+            tint: 1.0,
+            species: species as u32,
+        }
+    };
+    let drawn = |u: f64| {
+        let mut left = u * mix.density();
+        let found = mix.kinds.iter().position(|k| {
+            left -= k.density;
+            left < 0.0
+        });
+        found.unwrap_or(mix.kinds.len() - 1)
+    };
+    let chosen = ((stream.unit() * patch.trees.len() as f64) as usize).min(patch.trees.len() - 1);
+    let middle = &patch.trees[chosen];
+    let origin = if about.is_some() {
+        middle.position.map(f64::from)
+    } else {
+        [stream.unit() * side, stream.unit() * side]
+    };
+    let mut all = Vec::new();
+    if let Some(species) = about {
+        all.push(place([0.0; 2], species, stream));
+    }
+    // Images of the patch, whose trees are from 0 to its side.
+    let images = [0, 1].map(|k| ((origin[k] - radius) / side).floor() as i64..=((origin[k] + radius) / side).floor() as i64);
+    for (x, y) in images[0].clone().flat_map(|x| images[1].clone().map(move |y| (x, y))) {
+        for t in &patch.trees {
+            let at = [
+                f64::from(t.position[0]) + x as f64 * side - origin[0],
+                f64::from(t.position[1]) + y as f64 * side - origin[1],
+            ];
+            let itself = about.is_some() && t.index == middle.index && x == 0 && y == 0;
+            if !itself && at[0].hypot(at[1]) < radius && stream.unit() < share {
+                let species = drawn(stream.unit());
+                all.push(place(at, species, stream));
+            }
+        }
+    }
+    all
+}
