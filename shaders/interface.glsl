@@ -183,6 +183,14 @@ struct Tree {
     uint mean_lit_change;             // halves: average k_t / (k_t + k_t-bar), times nu; change of that correction with the height
 };
 
+// Of a tree that is seen by the camera: what the forest hands to it of light.
+struct HandedLight {
+    uvec2 sun;                        // light that met more than one surface, of the sun: colour, and profile by height
+    uvec2 sky;                        // of the sky
+    uvec2 open;                       // halves, at four heights: what there is of the sky's light over what its z-field knows
+    uvec2 spare;                      // a texel has four words
+};
+
 // What of a cascade lies between two seams of its map, and how the world is drawn there. Its coordinates are world-fixed: x and
 // y texels of the map, z depth. Also the push constants of the draws.
 struct ShadowBlock {

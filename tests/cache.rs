@@ -12,7 +12,7 @@ use std::time::SystemTime;
 use canopy::bake::cache::{self, CacheState, Source};
 use canopy::bake::{BakeSettings, Baked, BakedFrom, Needs, SpeciesBake, bake_species, load_or_bake_scene};
 use canopy::plan::Plan;
-use canopy::scene::{self, Mesh, OpticsOverride, Scene, Texture};
+use canopy::scene::{self, Albedo, Mesh, OpticsOverride, Scene, Texture};
 
 const SMALL: BakeSettings = BakeSettings { rings: 1, resolution: 16, occlusion_rays: 1, transfer_bands: 2 };
 const OPTICS: OpticsOverride = OpticsOverride {
@@ -212,7 +212,7 @@ fn of_scene(scene: &Scene, needs: Needs, dir: &Path) -> (Baked, BakedFrom) {
 }
 
 fn from(views: CacheState, transfer: Option<CacheState>, tables: CacheState) -> BakedFrom {
-    BakedFrom { views, transfer, tables, envelopes: None }
+    BakedFrom { views, transfer, tables, envelopes: None, indirect: None }
 }
 
 /// Baked once with all.
@@ -294,18 +294,20 @@ fn what_a_plan_does_not_need_is_not_baked() {
     let scene = forest();
     let needs =
         |scene: &Scene| Needs::from(&Plan::new(scene, &scene.cameras[0], [64, 48], false, None).unwrap());
-    assert_eq!(needs(&scene), Needs::ALL);
+    let all = Needs { indirect: false, ..Needs::ALL };
+    assert_eq!(needs(&scene), all);
     let without = |change: fn(&mut Scene)| {
         let mut other = scene.clone();
         change(&mut other);
         needs(&other)
     };
-    let average = Needs { transfer: false, ..Needs::ALL };
+    let average = Needs { transfer: false, ..all };
     assert_eq!(without(|s| s.settings.transfer_bands = 0), average);
     assert_eq!(without(|s| s.sun.irradiance = [0.0; 3]), average);
     assert_eq!(without(|s| s.cameras[0].position[2] = 1e5), average);
+    assert_eq!(without(|s| s.settings.indirect = 1), Needs::ALL);
     let bare = without(|s| s.species.clear());
-    assert_eq!(bare, Needs { trees: false, transfer: false, envelopes: false });
+    assert_eq!(bare, Needs { trees: false, transfer: false, envelopes: false, indirect: false });
 
     let dir = tempfile::tempdir().unwrap();
     assert!(load_or_bake_scene(&scene, bare, Some(dir.path()), true).unwrap().is_empty());
@@ -324,4 +326,34 @@ fn what_a_plan_does_not_need_is_not_baked() {
     let (whole, states) = of_scene(&scene, Needs::ALL, dir.path());
     assert_eq!(states, from(HIT.0, BAKED.1, CacheState::Hit));
     assert!(whole.species == first.species);
+}
+
+#[test]
+fn indirect_light_is_baked_where_it_counts_and_again_where_what_it_is_made_of_changes() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut scene = forest();
+    let state = |scene: &Scene, needs: Needs| of_scene(scene, needs, dir.path()).1.indirect;
+    assert_eq!(state(&scene, Needs::ALL), None, "fast leaves it out");
+    assert!(of_kind(dir.path(), "indirect").is_empty());
+    scene.settings.indirect = 1;
+    assert_eq!(state(&scene, Needs { indirect: false, ..Needs::ALL }), None, "a plan without it");
+    let (first, states) = of_scene(&scene, Needs::ALL, dir.path());
+    assert_eq!((states.indirect, states.tables), (Some(CacheState::Baked), CacheState::Hit));
+    let (again, states) = of_scene(&scene, Needs::ALL, dir.path());
+    assert_eq!(states.indirect, Some(CacheState::Hit));
+    assert!(first.indirect.is_some() && first.indirect == again.indirect);
+    // Light transfer has no part in it; the ground, the leaves' reflectance, densities and rays have.
+    scene.settings.transfer_bands = 2;
+    assert_eq!(state(&scene, Needs::ALL), Some(CacheState::Hit));
+    let changes: [fn(&mut Scene); 4] = [
+        |s| s.terrain.albedo = Albedo::Uniform([0.3; 3]),
+        |s| s.species[0].optics.leaf_reflectance = Some([0.2; 3]),
+        |s| s.species[0].scale = [0.5, 1.0],
+        |s| s.settings.table_rays = 64,
+    ];
+    for (k, change) in changes.into_iter().enumerate() {
+        change(&mut scene);
+        assert_eq!(state(&scene, Needs::ALL), Some(CacheState::Baked), "change {k}");
+    }
+    assert_eq!(of_kind(dir.path(), "indirect").len(), 5);
 }

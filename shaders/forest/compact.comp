@@ -38,7 +38,7 @@ layout(binding = 10) uniform sampler3D pair_table;
 layout(binding = 11) uniform sampler2DArray view_table;
 layout(binding = 12) uniform sampler2DArray heights;
 layout(binding = 13) uniform samplerBuffer indirect;
-layout(std430, binding = 14) writeonly buffer HandedLight { uvec4 items[]; } handed_light; // of each tree: the sun's, the sky's
+layout(std430, binding = 14) writeonly buffer HandedTable { HandedLight items[]; } handed_light;
 layout(constant_id = 6) const bool INDIRECT = false;
 layout(constant_id = 7) const int INDIRECT_FIRST = 0;  // texel where the first species' begins
 layout(constant_id = 8) const int INDIRECT_NODES = 2;  // of the density
@@ -127,8 +127,8 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     t.hole_change = packHalf2x16(vec2(density * kind.hole, sent.y / middle));
     t.own_lit = packHalf2x16(vec2(1.0 - nu, lit.x));
     t.mean_lit_change = packHalf2x16(vec2(mean_lit, lit.y));
-    // What the hole leaves of it, brought to what is seen of the tables' forest along this direction.
-    t.sky *= table_ground(view_table, table_zenith(slope.u.v, TABLE_ANGLES), table_density(thickness, kind.max_thickness, TABLE_DENSITIES),
+    // What the hole leaves of it, brought to what is seen of the tables' forest along this direction, unless it was measured by height.
+    if (!INDIRECT) t.sky *= table_ground(view_table, table_zenith(slope.u.v, TABLE_ANGLES), table_density(thickness, kind.max_thickness, TABLE_DENSITIES),
                           species, TABLE_ANGLES, TABLE_DENSITIES).z;
     // Rounded as opacities are, once a tree.
     float mesh_range = kind.mesh_range * s.scale;
@@ -139,7 +139,7 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
 }
 
 // Light that met more than one surface, of a tree among others of thickness x.
-uvec4 handed_on(Tree t, Species kind, vec3 ground, float x) {
+HandedLight handed_on(Tree t, Species kind, vec3 ground, float x) {
     vec3 l = view.v.sun_direction, to_camera = -normalize(t.centre);
     int base = INDIRECT_FIRST + int(t.species) * INDIRECT_NODES * INDIRECT_NODE;
     IndirectAt at = indirect_at(x, texelFetch(indirect, 0).w, INDIRECT_NODES);
@@ -147,7 +147,8 @@ uvec4 handed_on(Tree t, Species kind, vec3 ground, float x) {
     float tint = unpackHalf2x16(t.cascade_tint).y;
     sun.colour *= (tint * sun_facing(l, ground)) * view.v.sun_irradiance;
     sky.colour *= tint * view.v.sky_radiance;
-    return uvec4(pack_handed(sun), pack_handed(sky));
+    vec4 open = indirect_open(indirect, base, at, to_camera.z);
+    return HandedLight(pack_handed(sun), pack_handed(sky), pack_open(open), uvec2(0u));
 }
 
 void main() {

@@ -1,7 +1,7 @@
 // Light that met more than one surface, from the nodes of a species' forest. Twin: src/physics/indirect.rs, where what the terms are is told.
 // A node has its coefficients one after the other, a texel each.
 
-const int INDIRECT_SUN = 10, INDIRECT_NEAR_SUN = 15, INDIRECT_SKY = 3, INDIRECT_NEAR = 20, INDIRECT_FAR = 13, INDIRECT_NODE = 33;
+const int INDIRECT_SUN = 10, INDIRECT_NEAR_SUN = 15, INDIRECT_SKY = 3, INDIRECT_NEAR = 20, INDIRECT_FAR = 36, INDIRECT_NODE = 49;
 const int INDIRECT_GROUND = 4;       // texels of a node of the ground
 const float INDIRECT_NAMED = 0.5;    // height at which a tree's light has its colour
 
@@ -58,18 +58,39 @@ Handed indirect_near_sky(samplerBuffer nodes, int base, IndirectAt at, float v) 
     return handed_by(c[0] + v * (c[1] + v * c[2]), c[3], c[4]);
 }
 
+// What there is of the sky's light among other trees, over what a tree's z-field knows of it, at heights -3/4, -1/4, 1/4 and 3/4.
+vec4 indirect_open(samplerBuffer nodes, int base, IndirectAt at, float v) {
+    float up = clamp(0.5 - 5.0 * v, 0.0, 1.0); // the viewer looks, from the ground
+    vec4 open, sides = vec4(1.0 - up, (1.0 - up) * v, up, up * v);
+    for (int k = 0; k < 4; k++) {
+        vec3 c = vec3(0.0);
+        for (int s = 0; s < 4; s++) c += sides[s] * indirect_coefficient(nodes, base, at, INDIRECT_NODE, INDIRECT_NEAR + 4 * s + k);
+        open[k] = min(max(c.x, 0.0) / max(c.y, 1e-6), 4.0);
+    }
+    return open;
+}
+
+// Between these heights, and beyond as there.
+float open_at(vec4 open, float z) {
+    vec4 tents = max(1.0 - abs(clamp(2.0 * z + 1.5, 0.0, 3.0) - vec4(0.0, 1.0, 2.0, 3.0)), 0.0);
+    return dot(open, tents);
+}
+
+uvec2 pack_open(vec4 open) { return uvec2(packHalf2x16(open.xy), packHalf2x16(open.zw)); }
+vec4 unpack_open(uvec2 packed) { return vec4(unpackHalf2x16(packed.x), unpackHalf2x16(packed.y)); }
+
 // What of far trees is seen.
 vec3 indirect_far_sun(samplerBuffer nodes, int base, IndirectAt at, float v, float l, float q) {
     float y[INDIRECT_SUN];
     indirect_sun_terms(v, l, q, y);
     vec3 colour = vec3(0.0);
-    for (int i = 0; i < INDIRECT_SUN; i++) colour += y[i] * indirect_coefficient(nodes, base, at, INDIRECT_NODE, INDIRECT_NEAR + i);
+    for (int i = 0; i < INDIRECT_SUN; i++) colour += y[i] * indirect_coefficient(nodes, base, at, INDIRECT_NODE, INDIRECT_FAR + i);
     return max(colour, 0.0);
 }
 
 vec3 indirect_far_sky(samplerBuffer nodes, int base, IndirectAt at, float v) {
     vec3 c[3];
-    for (int i = 0; i < 3; i++) c[i] = indirect_coefficient(nodes, base, at, INDIRECT_NODE, INDIRECT_NEAR + INDIRECT_SUN + i);
+    for (int i = 0; i < 3; i++) c[i] = indirect_coefficient(nodes, base, at, INDIRECT_NODE, INDIRECT_FAR + INDIRECT_SUN + i);
     return max(c[0] + v * (c[1] + v * c[2]), 0.0);
 }
 

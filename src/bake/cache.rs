@@ -31,7 +31,7 @@ use crate::scene::{Mesh, OpticsOverride};
 
 const VIEWS: Format = Format { magic: *b"CANOPYZF", version: 14, extension: "zfield" };
 const TRANSFER: Format = Format { magic: *b"CANOPYLT", version: 4, extension: "transfer" };
-const INDIRECT: Format = Format { magic: *b"CANOPYIL", version: 5, extension: "indirect" };
+const INDIRECT: Format = Format { magic: *b"CANOPYIL", version: 14, extension: "indirect" };
 const ENVELOPES: Format = Format { magic: *b"CANOPYLE", version: 5, extension: "envelopes" };
 /// Numbers at the head of a file of views.
 const SCALARS: usize = 23 + 4 * TERMS;
@@ -198,6 +198,11 @@ impl<'a> Source<'a> {
         load_or_measure((self.dir, &self.key()), forest, whole, self.quiet)
     }
 
+    /// BLAKE3 of everything that its views depend on.
+    pub fn views_key(&self) -> [u8; 32] {
+        self.views
+    }
+
     /// BLAKE3 of everything that the whole bake depends on.
     pub fn key(&self) -> [u8; 32] {
         self.transfer.unwrap_or(self.views)
@@ -279,12 +284,7 @@ fn indirect_key(mix: &Mix, species: usize) -> [u8; 32] {
     for kind in &mix.kinds {
         fields.put(&kind.density.to_le_bytes());
         fields.put(bytemuck::bytes_of(&kind.scale));
-        fields.put(bytemuck::bytes_of(&kind.bark_ratio));
-        let optics = kind.optics;
-        for rgb in [optics.leaf_reflectance, optics.leaf_transmittance, optics.bark_reflectance] {
-            fields.put(rgb.as_ref().map_or(&[], bytemuck::bytes_of));
-        }
-        put_mesh(&mut fields, kind.mesh);
+        fields.put(&kind.key);
     }
     fields.key()
 }

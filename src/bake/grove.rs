@@ -94,13 +94,7 @@ impl Grove {
     }
 
     /// The nearest surface along a ray between 0 and `end`: its tree's index, and where on it.
-    pub fn nearest(
-        &self,
-        origin: Vec3,
-        direction: Vec3,
-        end: f32,
-        stack: &mut Stack,
-    ) -> Option<(u32, Met)> {
+    pub fn nearest(&self, origin: Vec3, direction: Vec3, end: f32, stack: &mut Stack) -> Option<(u32, Met)> {
         let mut found = None;
         self.top.walk(origin, direction, end, stack, |stack, k, t_max| {
             let met = self.nearest_of(k, origin, direction, t_max, stack);

@@ -1,9 +1,9 @@
 //! Light that met more than one surface ([`crate::physics::indirect`]), measured by paths through a forest of a species' meshes.
 //!
-//! Rays from random directions meet a tree that stands among others, and from there paths go on as light came: at every surface but the
+//! Rays from viewers in random directions, above the forest or on its ground, meet a tree that stands among others, and from there paths go on as light came: at every surface but the
 //! first they ask for the sun, and what leaves for the sky without meeting another surface counts for that. The ground is level, with the scene's
 //! mean reflectance. What a path brings, per irradiance of a sun in a random place, is a sample of L at this view, sun and height;
-//! coefficients are what makes Σ (L − Σ c Y)² least. A path's light varies by about twice its mean, and 65,536 rays for
+//! coefficients are what makes Σ (L − Σ c Y)² least. A path's light varies by about twice its mean, and 131,072 rays for
 //! `table_rays` = 2048, of which four tenths meet the tree, leave less than two hundredths of it to each of fifteen coefficients.
 
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
@@ -12,25 +12,26 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::SpeciesBake;
 use super::foliage::Foliage;
 use super::grove::{Grove, Tree};
 use super::least_squares;
 use super::tables::{ForestSettings, Patch, mean_area};
 use crate::Result;
-use crate::physics::crown::Crown;
 use crate::physics::hash::{Stream, hash2};
 use crate::physics::indirect::{
-    Angles, COEFFICIENTS, Indirect, NEAR_SKY, NEAR_SUN, SKY_TERMS, SUN_TERMS, near_sky_terms,
-    near_sun_terms, sky_terms, sun_terms,
+    Angles, COEFFICIENTS, Indirect, NEAR_SKY, NEAR_SUN, OPEN, SKY_TERMS, SUN_TERMS, near_sky_terms,
+    near_sun_terms, open_terms, sky_terms, sun_terms,
 };
 use crate::physics::tables::density_node;
-use crate::physics::views::Basis;
+use crate::physics::views::{self, Basis};
+use crate::physics::zfield::{self, Ray};
 use crate::progress::Progress;
 use crate::rays::Stack;
 use crate::scene::{Mesh, OpticsOverride};
 
 /// Rays at every density to one of the knob `table_rays`.
-const RAYS: u32 = 32;
+const RAYS: u32 = 64;
 /// Of these one in so many leaves the ground.
 const GROUND_RAYS: u32 = 4;
 /// Rays of a random stream; streams are the unit of work.
@@ -45,10 +46,10 @@ const SURE: u32 = 2;
 const LONGEST: u32 = 64;
 /// Rays leave the ground at this height, m.
 const GROUND_STEP: f64 = 1e-4;
-/// Viewers who look down more steeply than this cosine are above the forest; others see what nothing hides for so many of the
-/// tree's heights.
-const STEEP: f64 = 0.15;
-const NEAR: f64 = 2.0;
+/// Rays to the sky from each place that a ray meets: yes and no vary more than light that is summed up along a path.
+const SKY_RAYS: u32 = 8;
+/// Fainter view rays of z-fields show next to nothing.
+const FAINTEST: f64 = 0.02;
 /// Seeds.
 const SEED: u32 = 0x1d1;
 
@@ -59,10 +60,10 @@ pub struct Kind<'a> {
     pub mesh: &'a Mesh,
     /// What the scene says of its reflectances.
     pub optics: &'a OpticsOverride,
-    /// Its crown.
-    pub crown: Crown,
-    /// What bark sends of what leaves would in its place, linear RGB.
-    pub bark_ratio: [f32; 3],
+    /// What was baked of its views.
+    pub bake: &'a SpeciesBake,
+    /// Key of that.
+    pub key: [u8; 32],
     /// Trees of it per m² where the forest is densest.
     pub density: f64,
     /// Range of uniformly distributed scales.
@@ -92,7 +93,7 @@ impl Mix<'_> {
 
     /// x = λA there, of all species.
     pub fn thickness(&self) -> f64 {
-        self.kinds.iter().map(|k| k.density * mean_area(&k.crown, k.scale)).sum()
+        self.kinds.iter().map(|k| k.density * mean_area(&k.bake.crown, k.scale)).sum()
     }
 }
 
@@ -117,9 +118,7 @@ impl Place {
     fn nearest(&self, from: DVec3, direction: DVec3, stack: &mut Stack) -> Option<Met> {
         let end = if direction.z < 0.0 { (-from.z / direction.z).max(0.0) } else { f64::from(f32::MAX) };
         let limit = end.min(f64::from(f32::MAX)) as f32;
-        if let Some((tree, met)) =
-            self.grove.nearest(from.as_vec3(), direction.as_vec3(), limit, stack)
-        {
+        if let Some((tree, met)) = self.grove.nearest(from.as_vec3(), direction.as_vec3(), limit, stack) {
             return Some(self.leaf(tree, &met, direction));
         }
         (direction.z < 0.0).then(|| Met {
@@ -209,6 +208,30 @@ fn scattered(met: &Met, weight: &mut Vec3, may_end: bool, stream: &mut Stream) -
     Some((met.at + normal * met.step, (normal + sphere(stream)).normalize_or(normal)))
 }
 
+/// Share of the directions in which a surface scatters where the sky is.
+fn open(place: &Place, met: &Met, stream: &mut Stream, stack: &mut Stack) -> f32 {
+    let mut sky = || {
+        let (from, away) = scattered(met, &mut { Vec3::ONE }, false, stream)?;
+        place.open(from, away, stack).then_some(())
+    };
+    (0..SKY_RAYS).filter(|_| sky().is_some()).count() as f32 / SKY_RAYS as f32
+}
+
+/// The same as a tree's z-field has it where a ray at (a, b) of its box goes to `view`: half of the sky visibility there, for leaves of any
+/// orientation. `None` where it shows next to nothing.
+fn field_sky(bake: &SpeciesBake, tree: &Tree, view: DVec3, (a, b): (f64, f64)) -> Option<f32> {
+    let field = &bake.views;
+    let [c, s] = tree.turn.map(f64::from);
+    // In the tree's own axes.
+    let turned = |p: DVec3| DVec3::new(c * p.x + s * p.y, c * p.y - s * p.x, p.z);
+    let scale = bake.crown.frame.scale().as_dvec3();
+    let basis = Basis::new((view / scale).normalize());
+    let origin = turned(basis.right * a + basis.up * (b * basis.extent));
+    let to = (turned(view) / scale).normalize();
+    let seen = zfield::intersect(field, 0, &views::lookup(field.n, to), &Ray { origin, to }, 2);
+    (seen.alpha > FAINTEST).then_some(0.5 * seen.occlusion as f32)
+}
+
 /// A direction anywhere. A unit vector more than a normal has the density of the cosine to it.
 fn sphere(stream: &mut Stream) -> DVec3 {
     let (z, turn) = (2.0 * stream.unit() - 1.0, TAU * stream.unit());
@@ -251,7 +274,12 @@ impl<const N: usize> Fit<N> {
     }
 
     fn merge(&mut self, other: &Self) {
-        self.h.iter_mut().flatten().flatten().zip(other.h.iter().flatten().flatten()).for_each(|(a, b)| *a += b);
+        self.h
+            .iter_mut()
+            .flatten()
+            .flatten()
+            .zip(other.h.iter().flatten().flatten())
+            .for_each(|(a, b)| *a += b);
         self.y.iter_mut().flatten().zip(other.y.iter().flatten()).for_each(|(a, b)| *a += b);
     }
 
@@ -276,6 +304,8 @@ struct Fits {
     bark: Vec3,
     near_sun: Fit<NEAR_SUN>,
     near_sky: Fit<NEAR_SKY>,
+    /// Channels: the share of what is scattered that comes from the sky past all trees, and that which the z-field has.
+    open: Fit<OPEN>,
     far_sun: Fit<SUN_TERMS>,
     far_sky: Fit<SKY_TERMS>,
     ground_sun: Fit<3>,
@@ -286,6 +316,7 @@ impl Fits {
     fn merged(mut self, other: Fits) -> Fits {
         self.near_sun.merge(&other.near_sun);
         self.near_sky.merge(&other.near_sky);
+        self.open.merge(&other.open);
         self.far_sun.merge(&other.far_sun);
         self.far_sky.merge(&other.far_sky);
         self.ground_sun.merge(&other.ground_sun);
@@ -297,6 +328,7 @@ impl Fits {
         let all = [
             &self.near_sun.solve()[..],
             &self.near_sky.solve(),
+            &self.open.solve(),
             &self.far_sun.solve(),
             &self.far_sky.solve(),
             &self.ground_sun.solve(),
@@ -307,9 +339,9 @@ impl Fits {
     }
 
     /// A ray to the first tree of a place, from anywhere.
-    fn to_tree(&mut self, place: &Place, crown: &Crown, stream: &mut Stream, stack: &mut Stack) {
+    fn to_tree(&mut self, place: &Place, bake: &SpeciesBake, stream: &mut Stream, stack: &mut Stack) {
         let (view, light) = (sphere(stream), sun(stream));
-        let (tree, frame) = (place.grove.trees[0], crown.frame);
+        let (tree, frame) = (place.grove.trees[0], bake.crown.frame);
         let scale = frame.scale().as_dvec3();
         let basis = Basis::new((view / scale).normalize());
         let (a, b) = (2.0 * stream.unit() - 1.0, 2.0 * stream.unit() - 1.0);
@@ -322,9 +354,13 @@ impl Fits {
         let angles = Angles { view: view.z, sun: light.z, between: view.dot(light) };
         let above = met.at + met.normal * met.step;
         let seen = view.z > 0.0 && place.open(above, view, stack);
-        let near = seen || (view.z < STEEP && place.free(above, view, NEAR * f64::from(crown.height), stack));
+        let near = seen || (view.z < 0.0 && place.free(above, view, above.z / -view.z, stack));
         if !near {
             return;
+        }
+        let all = open(place, &met, stream, stack);
+        if let Some(field) = field_sky(bake, &tree, view, (a, b)) {
+            self.open.add(&open_terms(view.z, z), Vec3::ONE, Vec3::new(all, field, 0.0));
         }
         let share = if met.thin { Vec3::ONE } else { self.bark };
         let [of_sun, of_sky] = place.handed(met, light, stream, stack);
@@ -389,7 +425,7 @@ fn at_density(
     density: f64,
     node: u32,
 ) -> [[f32; 3]; COEFFICIENTS] {
-    let heights = mix.kinds.iter().map(|k| f64::from(k.crown.height * k.scale[1]));
+    let heights = mix.kinds.iter().map(|k| f64::from(k.bake.crown.height * k.scale[1]));
     let tallest = heights.fold(0.0, f64::max);
     let radius = (AROUND * tallest).min((MOST / (PI * density.max(1e-12))).sqrt());
     let places: Vec<[Place; 2]> = (0..PLACES)
@@ -408,7 +444,8 @@ fn at_density(
             })
         })
         .collect();
-    let (crown, bark) = (&mix.kinds[species].crown, Vec3::from(mix.kinds[species].bark_ratio));
+    let bake = mix.kinds[species].bake;
+    let bark = Vec3::from(bake.bark_ratio());
     let chunks = (mix.rays * RAYS).div_ceil(CHUNK).max(PLACES);
     let parts: Vec<Fits> = (0..chunks)
         .into_par_iter()
@@ -417,7 +454,7 @@ fn at_density(
             let (mut stream, mut stack) = (Stream::new(hash2(SEED + 1 + node, k)), Stack::new());
             let mut fits = Fits { bark, ..Fits::default() };
             for _ in 0..CHUNK {
-                fits.to_tree(tree, crown, &mut stream, &mut stack);
+                fits.to_tree(tree, bake, &mut stream, &mut stack);
             }
             for _ in 0..CHUNK / GROUND_RAYS {
                 fits.to_ground(ground, 0.25 * radius, &mut stream, &mut stack);
@@ -470,7 +507,8 @@ fn standing(
         all.push(place([0.0; 2], species, stream));
     }
     // Images of the patch, whose trees are from 0 to its side.
-    let images = [0, 1].map(|k| ((origin[k] - radius) / side).floor() as i64..=((origin[k] + radius) / side).floor() as i64);
+    let images = [0, 1]
+        .map(|k| ((origin[k] - radius) / side).floor() as i64..=((origin[k] + radius) / side).floor() as i64);
     for (x, y) in images[0].clone().flat_map(|x| images[1].clone().map(move |y| (x, y))) {
         for t in &patch.trees {
             let at = [
@@ -485,4 +523,90 @@ fn standing(
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bake::{BakeSettings, bake_species};
+    use crate::physics::indirect::Handed;
+    use crate::scene::mesh::{Material, Triangle};
+
+    /// A level board of 4 m² at 8 m, and a speck on the ground under it, so that a tree is 8 m high.
+    fn board() -> Mesh {
+        let leaf = Material {
+            name: "leaf".into(),
+            foliage: true,
+            base_color: [1.0; 4],
+            texture: None,
+            alpha_cutoff: None,
+            double_sided: true,
+        };
+        let mut mesh = Mesh { materials: vec![leaf], ..Mesh::default() };
+        mesh.positions = vec![
+            [-1.0, -1.0, 8.0],
+            [1.0, -1.0, 8.0],
+            [1.0, 1.0, 8.0],
+            [-1.0, 1.0, 8.0],
+            [0.0, 0.0, 0.0],
+            [0.01, 0.0, 0.0],
+            [0.0, 0.01, 0.01],
+        ];
+        mesh.normals = vec![[0.0, 0.0, 1.0]; 7];
+        mesh.uvs = vec![[0.0; 2]; 7];
+        mesh.triangles =
+            [[0, 1, 2], [0, 2, 3], [4, 5, 6]].map(|vertices| Triangle { vertices, material: 0 }).to_vec();
+        mesh
+    }
+
+    fn measured(ground: f32, scatters: f32, density: f64) -> Indirect {
+        let (mesh, rgb) = (board(), Some([scatters; 3]));
+        let optics =
+            OpticsOverride { leaf_reflectance: rgb, leaf_transmittance: rgb, ..OpticsOverride::default() };
+        let settings = BakeSettings { rings: 2, resolution: 16, occlusion_rays: 8, transfer_bands: 0 };
+        let bake = bake_species(&mesh, &optics, &settings, true).unwrap();
+        let kind = Kind { mesh: &mesh, optics: &optics, bake: &bake, key: [0; 32], density, scale: [1.0; 2] };
+        let mix = Mix { kinds: vec![kind], ground: [ground; 3], nodes: 2, rays: 512, poisson: true };
+        measure(&mix, 0, true).unwrap()
+    }
+
+    #[test]
+    fn a_board_gets_what_the_ground_sends_and_passes_half_of_it_on_to_either_side() {
+        // The ground under a sun of irradiance 1 at the cosine l sends 0.2 l / π, which is the same from all of it but the board's own shadow,
+        // 2 % of what the board sees. Of that irradiance, 0.2 l, it scatters 0.3 to either side; of an even sky's, 0.2 π, likewise. The share
+        // that is open to the sky of what it scatters is that of all ways up, a half.
+        let light = measured(0.2, 0.3, 1e-6);
+        for (view, sun) in [(-0.9, 0.9), (-0.7, 0.4), (0.8, 0.6), (0.9, 0.9)] {
+            let [of_sun, of_sky] = light.near(0.0, Angles { view, sun, between: view * sun });
+            let close = |handed: Handed, want: f64, what: &str| {
+                // Some 6,000 paths, half of which go down: 1.3 % of noise a coefficient, of which a few matter, and the shadow.
+                assert!(
+                    (handed.at(1.0)[1] / want - 1.0).abs() < 0.07,
+                    "{what} {view} {sun}: {:?} {want}",
+                    handed.at(1.0)
+                );
+            };
+            close(of_sun, 0.3 * 0.2 * sun / PI, "sun");
+            close(of_sky, 0.3 * 0.2, "sky");
+        }
+        assert!(light.ground(0.0, 0.7)[0].iter().all(|g| *g < 1e-6), "no trees, no light from them");
+    }
+
+    #[test]
+    fn where_nothing_scatters_nothing_is_handed_on() {
+        let black = measured(0.0, 0.0, 0.01);
+        assert!(black.nodes.iter().flatten().enumerate().all(|(k, c)| {
+            // All but what is open to the sky, which has no colour.
+            (20..20 + OPEN).contains(&(k % COEFFICIENTS)) || c.iter().all(|x| *x == 0.0)
+        }));
+    }
+
+    #[test]
+    fn any_number_of_threads_gives_the_same_bits() {
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| measured(0.2, 0.3, 0.02))
+        };
+        assert_eq!(on(1), on(3));
+    }
 }

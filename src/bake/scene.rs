@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use super::envelope::Envelopes;
 use super::indirect::{Kind, Mix};
-use super::{cache, CacheState, ForestSettings, Source, SpeciesBake};
+use super::{CacheState, ForestSettings, Source, SpeciesBake, cache};
 use crate::Result;
 use crate::ladder::Ladder;
 use crate::physics::indirect::Indirect;
 use crate::physics::tables::ForestTables;
 use crate::plan::Plan;
-use crate::scene::{Distribution, Scene};
+use crate::scene::{Distribution, Scene, Species};
 
 /// One species, ready to draw.
 #[derive(Clone, Debug)]
@@ -149,17 +149,21 @@ fn load_indirect_light(
     dir: Option<&Path>,
     quiet: bool,
 ) -> Result<()> {
-    let kinds = scene.species.iter().zip(&*baked).map(|(s, (b, _))| Kind {
-        mesh: &s.mesh,
-        optics: &s.optics,
-        crown: b.species.crown,
-        bark_ratio: b.species.bark_ratio(),
-        // A scene without trees still has species: any density will do.
-        density: s.full_density(scene.terrain.extent).max(1e-6),
-        scale: s.scale,
-    });
+    let bakes: Vec<Arc<SpeciesBake>> = baked.iter().map(|(b, _)| b.species.clone()).collect();
+    let kind = |(s, bake)| {
+        let s: &Species = s;
+        Ok(Kind {
+            mesh: &s.mesh,
+            optics: &s.optics,
+            bake,
+            key: Source::new(&s.mesh, &s.optics, &(&scene.settings).into(), dir, quiet)?.views_key(),
+            // A scene without trees still has species: any density will do.
+            density: s.full_density(scene.terrain.extent).max(1e-6),
+            scale: s.scale,
+        })
+    };
     let mix = Mix {
-        kinds: kinds.collect(),
+        kinds: scene.species.iter().zip(bakes.iter().map(Arc::as_ref)).map(kind).collect::<Result<_>>()?,
         ground: scene.terrain.mean_albedo(),
         nodes: scene.settings.table_densities,
         rays: scene.settings.table_rays,

@@ -24,7 +24,7 @@ Examples:
   canopy accuracy -o a --shard 2/4                     every fourth cell; shards may share the folder, or be copied into one
   canopy accuracy --list                               the design, without measuring
   canopy accuracy -o a                                 again: goes on where it stopped
-Each cell is a forest at a density, under a sun, on a slope: patches of it are drawn and path-traced (light that met one surface) from
+Each cell is a forest at a density, under a sun, on a slope: patches of it are drawn and path-traced (light of as many orders as the knob indirect counts) from
 the same directions. A third of the cells is kept apart (--part kept): look at them last, when nothing is tuned any more.
 A reference is traced once and kept whatever becomes of the program; what was drawn is kept until the program or a knob changes.";
 

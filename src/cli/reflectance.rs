@@ -35,8 +35,8 @@ positive slope descends towards the sun. Pixels are those of --size and --camera
 The reference is Monte-Carlo, of the same trees through the same rays; distance means nothing to it, and its rows repeat. Each
 image of a patch is traced until the standard error of its mean is that of --until (of the channel where it is largest,
 default 1%). stderr is what patches differ by, divided by the root of their number: it contains the Monte-Carlo error, which
-the noise of the --json report gives alone. Without --bounces light is scattered any number of times: the truth, which holds
-more light than the renderer models. --bounces 1 is the renderer's own model of the sun, light that met one surface: what
+the noise of the --json report gives alone. Without --bounces light is scattered any number of times: the truth. --bounces 1 is light
+that met one surface, which the renderer draws with the knob indirect at 0: what
 differs then is how trees are represented.";
 
 /// Error of the mean of an image of a patch if no one says.

@@ -41,7 +41,7 @@ Examples:
 The reference is Monte-Carlo: every tree's own triangles, on the seeds that the renderer draws. Its error is the root mean
 square, over pixels and channels, of the standard error of the radiance, over the root mean square radiance; a quarter of the
 error takes sixteen times the time. Its EXR also has the layers variance (of the mean radiance) and samples. It opens no
-Vulkan device. --bounces 1 is light that met one surface, as the renderer's own sun light is.";
+Vulkan device. --bounces 1 is light that met one surface, as the renderer draws it with --set indirect=0.";
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{}", knobs_help()))]

@@ -27,7 +27,7 @@ Examples:
   canopy sweep -o s --knobs view_rings=4/6/9 --product 0  these values only, around balanced
   canopy sweep -o s --reference truth/                errors against truth/CAMERA.exr, with a layer `variance` if it is noisy
   canopy sweep -o s --reference none                  errors against the most accurate setting only
-  canopy sweep -o s --reference-until 1% --bounces full   a better reference, with light of all orders
+  canopy sweep -o s --reference-until 1%                  a better reference
   canopy sweep -o s                                   again: goes on where it stopped
   canopy sweep -o s1 --shard 1/2; canopy sweep -o s2 --shard 2/2; canopy sweep -o s --from s1 --from s2
   canopy render --budget 50ms --sweep s/sweep.json    the most accurate setting that holds 50 ms there
@@ -60,8 +60,8 @@ pub struct Args {
     /// time a camera such as 60s (shards then trace different ones)
     #[arg(long, value_name = "2%|64spp|60s", default_value = "2%", value_parser = options::goal, conflicts_with = "reference")]
     reference_until: Goal,
-    /// Surfaces that light may meet on its way in that reference: 1 is what the renderer models, full any number
-    #[arg(long, value_name = "1|N|full", default_value = "1", value_parser = options::bounces, conflicts_with = "reference")]
+    /// Surfaces that light may meet on its way in that reference: full any number, 1 what the renderer has with indirect=0
+    #[arg(long, value_name = "1|N|full", default_value = "full", value_parser = options::bounces, conflicts_with = "reference")]
     bounces: Bounces,
     /// Frames of each camera and setting; the first only warms up
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(2..=10_000))]

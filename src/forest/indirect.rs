@@ -30,15 +30,21 @@ impl IndirectData {
             let nodes = gpu.texel_buffer("no indirect light", NODE_TEXELS.1, NODE_TEXELS)?;
             return Ok(IndirectData { nodes, handed: none()? });
         }
-        let missing = || Error::Usage("a species was baked without the indirect light that the plan lists".into());
+        let missing =
+            || Error::Usage("a species was baked without the indirect light that the plan lists".into());
         let all: Vec<&Indirect> = baked
             .iter()
-            .map(|b| b.indirect.as_deref().filter(|i| i.nodes.len() == plan.indirect as usize).ok_or_else(missing))
+            .map(|b| {
+                b.indirect.as_deref().filter(|i| i.nodes.len() == plan.indirect as usize).ok_or_else(missing)
+            })
             .collect::<Result<_>>()?;
         let texels = [ground(&all), species(&all)].concat();
         let handed =
             if plan.z_fields { gpu.described_buffer(&plan.buffer(resource::HANDED))? } else { none()? };
-        Ok(IndirectData { nodes: gpu.described_buffer_with(&plan.buffer(resource::INDIRECT), &texels)?, handed })
+        Ok(IndirectData {
+            nodes: gpu.described_buffer_with(&plan.buffer(resource::INDIRECT), &texels)?,
+            handed,
+        })
     }
 
     /// Texel where the first species' nodes begin.

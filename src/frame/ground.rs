@@ -47,7 +47,9 @@ impl NoTrees {
 
     /// Coverage tiles, shader-map nodes and indirect light of the forest, or these.
     pub fn or<'a>(&'a self, forest: Option<(&'a Forest, &'a ShaderMap)>) -> (&'a Image, [&'a Buffer; 2]) {
-        forest.map_or((&self.coverage, [&self.nodes, &self.indirect]), |(f, map)| (&f.coverage.tiles, [&map.nodes, &f.indirect.nodes]))
+        forest.map_or((&self.coverage, [&self.nodes, &self.indirect]), |(f, map)| {
+            (&f.coverage.tiles, [&map.nodes, &f.indirect.nodes])
+        })
     }
 }
 

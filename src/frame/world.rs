@@ -7,10 +7,10 @@ use super::shadows::{CastingTrees, Shadows};
 use super::sky::SkyPass;
 use super::trees::shader_map::ShaderMap;
 use crate::bake::Baked;
-use crate::forest::indirect::IndirectData;
 use crate::forest::casters::CasterData;
 use crate::forest::coverage::CoverageData;
 use crate::forest::cull::CullData;
+use crate::forest::indirect::IndirectData;
 use crate::forest::meshes::MeshData;
 use crate::forest::seeds::SeedData;
 use crate::forest::species::SpeciesData;
@@ -147,7 +147,8 @@ impl World {
 
     /// Records which trees the camera sees.
     pub fn visibility(&self, recorder: &mut Recorder) {
-        if let Some(Forest { seeds, species, tables, indirect, near: Some(NearTrees { cull, .. }), .. }) = &self.forest
+        if let Some(Forest { seeds, species, tables, indirect, near: Some(NearTrees { cull, .. }), .. }) =
+            &self.forest
         {
             recorder.stage("visibility", |r| {
                 cull.record(r, &self.view, seeds, species, (tables, indirect), &self.terrain);

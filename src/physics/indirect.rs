@@ -27,10 +27,13 @@ pub const NEAR_SUN: usize = SUN_TERMS + 5;
 pub const SKY_TERMS: usize = 3;
 /// Terms of the sky's light on near trees.
 pub const NEAR_SKY: usize = SKY_TERMS + 2;
+/// Terms of what of the sky's light other trees leave ([`open_terms`]).
+pub const OPEN: usize = 4 * OPEN_HEIGHTS.len();
 /// Terms of the light on the ground: three of the sun's, one of the sky's.
 pub const GROUND: usize = 4;
-/// Coefficients of a node, in this order: near trees' of the sun and of the sky, far trees' likewise, the ground's.
-pub const COEFFICIENTS: usize = NEAR_SUN + NEAR_SKY + SUN_TERMS + SKY_TERMS + GROUND;
+/// Coefficients of a node, in this order: near trees' of the sun and of the sky, what of the sky is open to them, far trees' of the sun and of
+/// the sky, the ground's.
+pub const COEFFICIENTS: usize = NEAR_SUN + NEAR_SKY + OPEN + SUN_TERMS + SKY_TERMS + GROUND;
 /// Where a tree's light is named by its colour: its height for [`Handed`].
 pub const NAMED: f64 = 0.5;
 /// Most of a profile's slopes, so that half floats hold them.
@@ -78,6 +81,54 @@ pub fn sky_terms(view: f64) -> [f64; SKY_TERMS] {
 pub fn near_sky_terms(view: f64, z: f64) -> [f64; NEAR_SKY] {
     let [a, b, c] = sky_terms(view);
     [a, b, c, z, z * z]
+}
+
+/// Heights between which what is open to the sky is linear, and beyond which it is as there.
+pub const OPEN_HEIGHTS: [f64; 4] = [-0.75, -0.25, 0.25, 0.75];
+
+/// How much a viewer is one who looks up from the ground, 1, rather than one above the forest, 0; some of each where v is nearly 0. They see other
+/// leaves at the same height.
+fn looks_up(view: f64) -> f64 {
+    (0.5 - 5.0 * view).clamp(0.0, 1.0)
+}
+
+/// Weights of the heights at z.
+fn tents(z: f64) -> [f64; 4] {
+    let step = OPEN_HEIGHTS[1] - OPEN_HEIGHTS[0];
+    let at = ((z - OPEN_HEIGHTS[0]) / step).clamp(0.0, 3.0);
+    std::array::from_fn(|k| (1.0 - (at - k as f64).abs()).max(0.0))
+}
+
+/// What the heights' coefficients are of: viewers above the forest, with 1 and v, and likewise those on the ground.
+fn sides(view: f64) -> [f64; 4] {
+    let up = looks_up(view);
+    [1.0 - up, (1.0 - up) * view, up, up * view]
+}
+
+/// Terms of what is open to the sky: the heights, for each of the sides.
+pub fn open_terms(view: f64, z: f64) -> [f64; OPEN] {
+    let (sides, tents) = (sides(view), tents(z));
+    std::array::from_fn(|i| sides[i / 4] * tents[i % 4])
+}
+
+/// What there is of the sky's light among other trees over what a tree's z-field knows of it, at [`OPEN_HEIGHTS`]: in a forest of oaks and pines
+/// about 0.1 to 0.9.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Open(pub [f64; 4]);
+
+/// Most that it is; z-fields may know of less than there is.
+const BRIGHTEST: f64 = 4.0;
+
+impl Open {
+    /// Of what all trees leave, and of what the z-field knows.
+    fn new(all: [f64; 4], own: [f64; 4]) -> Self {
+        Open(std::array::from_fn(|k| (all[k].max(0.0) / own[k].max(1e-6)).min(BRIGHTEST)))
+    }
+
+    /// At a height.
+    pub fn at(&self, z: f64) -> f64 {
+        tents(z).iter().zip(self.0).map(|(t, open)| t * open).sum()
+    }
 }
 
 /// Light that a tree hands on, by height: colour · max(1 + b (z − ½) + c (z² − ¼), 0), what is linear RGB being so at z = ½, inside every
@@ -133,10 +184,19 @@ impl Indirect {
         ]
     }
 
+    /// What there is of the sky's light on a near tree over what its z-field knows.
+    pub fn open(&self, x: f64, view: f64) -> Open {
+        let (all, sides) = (self.at(x), sides(view));
+        let open = &all[NEAR_SUN + NEAR_SKY..][..OPEN];
+        let of =
+            |c: usize| std::array::from_fn(|k| (0..4).map(|s| sides[s] * open[4 * s + k][c]).sum::<f64>());
+        Open::new(of(0), of(1))
+    }
+
     /// The same of far trees, all of them that are seen.
     pub fn far(&self, x: f64, angles: Angles) -> [[f64; 3]; 2] {
         let all = self.at(x);
-        let first = NEAR_SUN + NEAR_SKY;
+        let first = NEAR_SUN + NEAR_SKY + OPEN;
         [sum(&sun_terms(angles), &all[first..]), sum(&sky_terms(angles.view), &all[first + SUN_TERMS..])]
             .map(|rgb| rgb.map(|c| c.max(0.0)))
     }
@@ -151,4 +211,52 @@ impl Indirect {
 
 fn sum(terms: &[f64], coefficients: &[[f64; 3]]) -> [f64; 3] {
     std::array::from_fn(|c| terms.iter().zip(coefficients).map(|(t, k)| t * k[c]).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_is_linear_between_nodes_and_by_height_that_of_its_terms() {
+        let node = |sun: f32| {
+            let mut node = [[0.0; 3]; COEFFICIENTS];
+            // 1 + z + z²/2 of the sun, and as much of the sky without heights.
+            (node[0], node[SUN_TERMS], node[SUN_TERMS + 3]) = ([sun; 3], [sun; 3], [0.5 * sun; 3]);
+            node[NEAR_SUN] = [sun; 3];
+            node
+        };
+        let light = Indirect { max_thickness: 4.0, nodes: vec![node(0.0), node(1.0), node(2.0)] };
+        let angles = Angles { view: 0.3, sun: 0.5, between: 0.2 };
+        // Nodes lie at 0, 1 and 4: three quarters of the way from the second to the third at 1.75² = 3.0625.
+        let [sun, sky] = light.near(3.0625, angles);
+        for z in [-0.9, 0.0, 0.5, 1.0] {
+            assert!((sun.at(z)[1] - 1.75 * (1.0 + z + 0.5 * z * z)).abs() < 1e-12);
+            assert!((sky.at(z)[2] - 1.75).abs() < 1e-12);
+        }
+        assert_eq!(
+            light.near(0.0, angles)[0].at(0.0),
+            [0.0; 3],
+            "nothing, though its profile is a ratio of nothings"
+        );
+        assert_eq!(light.near(9.0, angles), light.near(4.0, angles), "beyond the last node as there");
+    }
+
+    #[test]
+    fn the_open_sky_is_that_of_its_heights_on_either_side() {
+        let mut node = [[0.0; 3]; COEFFICIENTS];
+        for k in 0..4 {
+            // From above 0.2, 0.4, 0.6 and 0.8 of what the z-field has, from below half of that.
+            let all = 0.1 * (k + 1) as f32;
+            node[NEAR_SUN + NEAR_SKY + k] = [all, 0.5, 0.0];
+            node[NEAR_SUN + NEAR_SKY + 8 + k] = [0.5 * all, 0.5, 0.0];
+        }
+        let light = Indirect { max_thickness: 1.0, nodes: vec![node; 2] };
+        let at = |view: f64, z: f64| light.open(0.5, view).at(z);
+        for (view, z, want) in
+            [(0.9, -0.75, 0.2), (0.9, 0.0, 0.5), (0.9, 1.0, 0.8), (-0.5, 0.25, 0.3), (0.0, 0.25, 0.45)]
+        {
+            assert!((at(view, z) - want).abs() < 1e-6, "{view} {z}: {}", at(view, z));
+        }
+    }
 }

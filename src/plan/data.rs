@@ -127,7 +127,8 @@ impl Plan {
         let reason = "light that met more than one surface, by density";
         items.add("data", "indirect light", reason, [nodes]);
         if self.z_fields {
-            let handed = described(resource::HANDED, u64::from(self.tree_capacity), TREE_TEXELS);
+            let texels = u64::from(self.tree_capacity) * size_of::<gpu::HandedLight>() as u64 / TREE_TEXELS.1;
+            let handed = described(resource::HANDED, texels, TREE_TEXELS);
             let reason = format!("the same of up to {} trees in a frame", self.tree_capacity);
             items.add("target", "handed light", reason, [handed]);
         }

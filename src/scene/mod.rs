@@ -14,10 +14,10 @@ pub mod texture;
 use std::sync::Arc;
 
 use crate::ladder::Ladder;
-use crate::physics::tonemap;
 use crate::physics::light::sun_disc_fraction;
 use crate::physics::raster::Raster;
 use crate::physics::terrain::height_and_slope;
+use crate::physics::tonemap;
 use crate::settings::{Settings, nearest};
 use crate::{Error, Result};
 pub use file::{default_scene, load, load_at, parse};
@@ -93,8 +93,7 @@ impl Terrain {
         match &self.albedo {
             Albedo::Uniform(rgb) => *rgb,
             Albedo::Image(t) => {
-                let linear: Vec<f64> =
-                    (0..=255).map(|k| tonemap::linear(f64::from(k) / 255.0)).collect();
+                let linear: Vec<f64> = (0..=255).map(|k| tonemap::linear(f64::from(k) / 255.0)).collect();
                 let mut sum = [0.0; 3];
                 for pixel in t.rgba.chunks_exact(4) {
                     (0..3).for_each(|c| sum[c] += linear[pixel[c] as usize]);

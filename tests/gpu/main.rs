@@ -14,6 +14,7 @@ mod frugal;
 mod ground;
 mod handover;
 mod in_flight;
+mod indirect;
 mod leaf;
 mod light;
 mod light_on_ground;

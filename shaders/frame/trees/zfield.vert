@@ -37,9 +37,10 @@ layout(location = 22) flat out vec4 own;       // dither, c of the self-shadow t
 layout(location = 23) flat out vec4 bark_ratio; // relative colour; w: height under which there is only bark
 layout(location = 24) flat out vec4 mean_sun;   // average light, times nu; w: 1 - nu
 layout(location = 26) flat out vec4 sun_from;   // in the tree's own axes; w: strength of light transfer
-layout(std430, binding = 10) readonly buffer HandedLight { uvec4 items[]; } handed_light;
+layout(std430, binding = 10) readonly buffer HandedTable { HandedLight items[]; } handed_light;
 layout(constant_id = 10) const bool INDIRECT = false;
-layout(location = 27) flat out uvec4 handed;    // light that met more than one surface
+layout(location = 27) flat out uvec4 handed;    // light that met more than one surface: the sun's, the sky's
+layout(location = 28) flat out uvec2 handed_sky; // and what there is of the sky's over what the z-field knows
 layout(location = 25) flat out vec4 mean_sky;   // w: average lit fraction, times nu
 
 void main() {
@@ -89,7 +90,13 @@ void main() {
     sky = vec4(t.sky, plane.half_extent.z);
     uvec3 row = masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz;
     tree_bits = uvec4(row, cascade_of(t) | (below ? 16u : 0u) | t.species << 5u | caster_name(t.identity) << 8u | (t.mean_lit_change & 0xffff0000u));
-    handed = INDIRECT ? handed_light.items[index] : uvec4(0u);
+    handed = uvec4(0u);
+    handed_sky = uvec2(0u);
+    if (INDIRECT) {
+        HandedLight h = handed_light.items[index];
+        handed = uvec4(h.sun, h.sky);
+        handed_sky = h.open;
+    }
     bark_ratio = vec4(kind.bark_ratio, kind.bare_below);
     mean_sun = vec4(t.mean_sun, weight.x);
     mean_sky = vec4(t.mean_sky, lit.x);

@@ -21,6 +21,7 @@ struct TreeLight {
     uint cascade;       // for shadow lookups; MAX_CASCADES: none
     uint name;          // in the shadow maps
     uvec4 handed;       // light that met more than one surface: the sun's, the sky's
+    uvec2 open;         // what there is of the sky's over what the z-field knows
 };
 
 // The ray from a seen point to the sun.
@@ -37,7 +38,7 @@ struct LightRay {
 // What is asked of the light.
 struct LightQuality {
     bool sun;           // it shines
-    bool indirect;      // light that met more than one surface counts
+    bool indirect;      // light of the forest counts
     int iterations;     // to where its light enters the crown
     uint bands;         // of light transfer
 };
@@ -97,9 +98,10 @@ TreeParts tree_light(sampler2DArray views, sampler2DArray shadow_map, sampler2DA
         }
         light.sun += t.sun * colour * reached;
     }
-    // Depth under the top of the canopy, for the sky through the hole around the tree.
+    // Depth under the top of the canopy, for the sky through the hole around the tree, where what others leave was not measured.
     float below_top = max(1.0 - height, 0.0) * t.half_height;
-    light.sky += t.sky * colour * (at.occlusion / (1.0 + below_top * below_top * t.hole));
+    float others = quality.indirect ? open_at(unpack_open(t.open), height) : 1.0 / (1.0 + below_top * below_top * t.hole);
+    light.sky += t.sky * colour * (at.occlusion * others);
     if (quality.indirect) {
         vec3 bark = mix(t.bark_ratio, vec3(1.0), smoothstep(t.bare_below - 0.05, t.bare_below + 0.05, height));
         light.sun += handed_at(t.handed.xy, height) * bark;

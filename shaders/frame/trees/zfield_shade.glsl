@@ -26,6 +26,7 @@ layout(location = 23) flat in vec4 bark_ratio;
 layout(location = 24) flat in vec4 mean_sun;
 layout(location = 25) flat in vec4 mean_sky;
 layout(location = 27) flat in uvec4 handed;
+layout(location = 28) flat in uvec2 handed_sky;
 layout(location = 26) flat in vec4 sun_from; // in the tree's own axes; w: strength of light transfer
 
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
@@ -83,7 +84,7 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
     ray.turn = view.v.cascade_turn[min(tree_bits.w & 15u, MAX_CASCADES - 1u)].xy;
     TreeLight tree = TreeLight(sun.rgb, own.w, sky.rgb, mean_sun.rgb, mean_sky.rgb, mean_sky.w, mean_sun.w,
                                vec2(own.z, unpackHalf2x16(tree_bits.w).y), bark_ratio.rgb, bark_ratio.w, sky.w,
-                               sun.w, own.y, optics.y, sun_from.xyz, sun_from.w, tree_bits.w & 15u, tree_bits.w >> 8u & 255u, handed);
+                               sun.w, own.y, optics.y, sun_from.xyz, sun_from.w, tree_bits.w & 15u, tree_bits.w >> 8u & 255u, handed, handed_sky);
     TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, tree, at, p, d, layers, below, optics.x, MAGNIFIED, s,
                                  height, ray, LightQuality(HAS_SUN, INDIRECT, LIGHT_ITERATIONS, TRANSFER_BANDS));
     sun_part = parts.sun;

@@ -31,6 +31,14 @@ Tree fetch_tree(usamplerBuffer trees, uint index) {
     return t;
 }
 
+// What the forest hands to it, of two texels.
+HandedLight fetch_handed(usamplerBuffer handed, uint index) {
+    uvec4 a = texelFetch(handed, 2 * int(index)), b = texelFetch(handed, 2 * int(index) + 1);
+    return HandedLight(a.xy, a.zw, b.xy, b.zw);
+}
+
+HandedLight nothing_handed() { return HandedLight(uvec2(0u), uvec2(0u), uvec2(0u), uvec2(0u)); }
+
 // Its cascade for shadow lookups, MAX_CASCADES where it is beyond all.
 uint cascade_of(Tree t) { return t.cascade_tint & 0xffu; }
 

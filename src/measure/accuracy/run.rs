@@ -180,7 +180,7 @@ impl<'a> Work<'a> {
             Lit { sun_zenith, slope: cell.slope, ground: luminance([0, 1, 2].map(lit)), averages: false };
         let views = views(cell);
         let what = (VERSION, cell, &views, SceneIdentity::new(&patch), albedo);
-        let how = (request.method, format!("{:?}", request.until));
+        let how = (request.method, format!("{:?}", request.until), scene.settings.indirect);
         let key = crate::files::digest(format!("{what:?} {how:?}").as_bytes())[..16].to_string();
         Ok(Work { request, cell, scene, patch, densities, views, lit, key, folder: folder.join("cells") })
     }
@@ -202,6 +202,11 @@ impl<'a> Work<'a> {
             .to_string()
     }
 
+    /// Surfaces that light may meet on its way in the reference: as many as what is drawn counts.
+    fn bounces(&self) -> Option<u32> {
+        if self.scene.settings.indirect > 0 { None } else { Some(1) }
+    }
+
     fn kept_reference(&self) -> Option<Vec<Measured>> {
         read(&self.reference_file(), &self.key)
     }
@@ -216,7 +221,7 @@ impl<'a> Work<'a> {
             return Ok(false);
         }
         let options = reference::Options {
-            bounces: Some(1),
+            bounces: self.bounces(),
             until: self.request.until,
             ..reference::Options::default()
         };

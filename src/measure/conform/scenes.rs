@@ -86,6 +86,7 @@ pub const ALL: &[SceneCase] = &[
         ..GROVE
     },
     SceneCase { name: "light-transfer", knobs: &[("transfer_bands", 1.0)], ..GROVE },
+    SceneCase { name: "all-orders", knobs: &[("indirect", 1.0)], ..HILLS },
     SceneCase { name: "mode-fractions", mode: ViewMode::Fractions, ..GROVE },
     SceneCase { name: "mode-coverage", mode: ViewMode::Coverage, ..ABOVE },
     SceneCase { name: "mode-lod", mode: ViewMode::Lod, ..HILLS },

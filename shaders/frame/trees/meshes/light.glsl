@@ -94,8 +94,10 @@ Shown shade(uint what, vec3 world) {
     if (!leaf && dot(n, viewer) < 0.0) n = -n;
     vec3 reflectance = optics.items[3u * t.species + (leaf ? 0u : 2u)].rgb, transmittance = leaf ? optics.items[3u * t.species + 1u].rgb : vec3(0.0);
     vec2 hole = unpackHalf2x16(t.hole_change), own = unpackHalf2x16(t.own_lit), lit = unpackHalf2x16(t.mean_lit_change);
-    float metres = (back * (world - t.centre)).z + kind.centre * t.scale;
-    LeafLight light = leaf_light(face, n, viewer, sun, metres, hole.x / max(kind.hole, 1e-9) * kind.mean_area);
+    float above_middle = (back * (world - t.centre)).z, height = above_middle / (kind.scale_to_metres.z * t.scale);
+    HandedLight handed = nothing_handed();
+    if (INDIRECT) handed = fetch_handed(handed_light, index);
+    LeafLight light = leaf_light(face, n, viewer, sun, above_middle + kind.centre * t.scale, hole.x / max(kind.hole, 1e-9) * kind.mean_area);
     vec3 sky = tint_of(t) * view.v.sky_radiance;
     vec3 sky_part = own.x * leaf_sky(reflectance, transmittance, n, viewer, light.sky) * sky + t.mean_sky;
     vec3 sun_part = t.mean_sun;
@@ -106,11 +108,9 @@ Shown shade(uint what, vec3 world) {
         sun_part += (own.x * visible * tint_of(t)) * leaf_sun(reflectance, transmittance, n, viewer, sun) * v.sun_irradiance;
     }
     if (INDIRECT) {
-        uvec4 handed = texelFetch(handed_light, int(index));
-        float middle = (back * (world - t.centre)).z / (kind.scale_to_metres.z * t.scale);
         vec3 of_leaves = leaf ? vec3(1.0) : kind.bark_ratio;
-        sun_part += handed_at(handed.xy, middle) * of_leaves;
-        sky_part += handed_at(handed.zw, middle) * of_leaves;
+        sun_part += handed_at(handed.sun, height) * of_leaves;
+        sky_part += handed_at(handed.sky, height) * of_leaves;
     }
 #ifdef LAYERS
     return Shown(vec4(sun_part, 1.0), vec4(sky_part, 1.0), vec4(0.0, 0.0, lit_part, 1.0 - lit_part));

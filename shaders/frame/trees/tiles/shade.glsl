@@ -86,9 +86,11 @@ Shown shade(uint rank, vec2 offset, out float depth) {
     ray.entry.z += 0.5 * v.cascade_texel[cascade] * ray.deeper;
     float phase_angle = angle_between(-t.centre, v.sun_direction), root = sqrt(phase_angle);
     vec2 hole = unpackHalf2x16(t.hole_change), own = unpackHalf2x16(t.own_lit), lit = unpackHalf2x16(t.mean_lit_change);
+    HandedLight handed = nothing_handed();
+    if (INDIRECT) handed = fetch_handed(handed_light, who & 0x3fffffffu);
     TreeLight light = TreeLight(t.sun, hole.y, t.sky, t.mean_sun, t.mean_sky, lit.x, own.x, vec2(own.y, lit.y), kind.bark_ratio,
                                 kind.bare_below, plane.half_extent.z, hole.x, kind.leaf_shadow * root, kind.extinction * phase_angle / t.scale, toward,
-                                transfer_strength(root), cascade_of(t), caster_name(t.identity), INDIRECT ? texelFetch(handed_light, int(who & 0x3fffffffu)) : uvec4(0u));
+                                transfer_strength(root), cascade_of(t), caster_name(t.identity), uvec4(handed.sun, handed.sky), handed.open);
     TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, light, surface, at, to, layers, below, t.mip, magnified,
                                  s, found.z, ray, LightQuality(HAS_SUN, INDIRECT, LIGHT_ITERATIONS, TRANSFER_BANDS));
 #ifdef LAYERS
