@@ -6,16 +6,20 @@
 //! coefficients are what makes Σ (L − Σ c Y)² least. A path's light varies by about twice its mean, and 131,072 rays for
 //! `table_rays` = 2048, of which four tenths meet the tree, leave less than two hundredths of it to each of fifteen coefficients.
 
-use std::f64::consts::{FRAC_1_PI, PI, TAU};
+mod fit;
+mod place;
+
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use self::fit::Fit;
+use self::place::{GROUND_STEP, Place, open, scattered, sphere, sun};
 use super::SpeciesBake;
 use super::foliage::Foliage;
 use super::grove::{Grove, Tree};
-use super::least_squares;
 use super::tables::{ForestSettings, Patch, mean_area};
 use crate::Result;
 use crate::physics::hash::{Stream, hash2};
@@ -41,13 +45,6 @@ const PLACES: u32 = 8;
 /// Trees stand around such a place as far as so many heights of the tallest, and no more than so many.
 const AROUND: f64 = 8.0;
 const MOST: f64 = 1500.0;
-/// Surfaces before Russian roulette begins, and after which a path ends.
-const SURE: u32 = 2;
-const LONGEST: u32 = 64;
-/// Rays leave the ground at this height, m.
-const GROUND_STEP: f64 = 1e-4;
-/// Rays to the sky from each place that a ray meets: yes and no vary more than light that is summed up along a path.
-const SKY_RAYS: u32 = 8;
 /// Fainter view rays of z-fields show next to nothing.
 const FAINTEST: f64 = 0.02;
 /// Seeds.
@@ -97,126 +94,6 @@ impl Mix<'_> {
     }
 }
 
-/// A surface on a path.
-struct Met {
-    at: DVec3,
-    normal: DVec3,
-    step: f64,
-    reflectance: Vec3,
-    transmittance: Vec3,
-    thin: bool,
-}
-
-/// Trees around the origin, on level ground.
-struct Place {
-    grove: Grove,
-    ground: Vec3,
-}
-
-impl Place {
-    /// The nearest surface on a ray.
-    fn nearest(&self, from: DVec3, direction: DVec3, stack: &mut Stack) -> Option<Met> {
-        let end = if direction.z < 0.0 { (-from.z / direction.z).max(0.0) } else { f64::from(f32::MAX) };
-        let limit = end.min(f64::from(f32::MAX)) as f32;
-        if let Some((tree, met)) = self.grove.nearest(from.as_vec3(), direction.as_vec3(), limit, stack) {
-            return Some(self.leaf(tree, &met, direction));
-        }
-        (direction.z < 0.0).then(|| Met {
-            at: (from + direction * end).with_z(0.0),
-            normal: DVec3::Z,
-            step: GROUND_STEP,
-            reflectance: self.ground,
-            transmittance: Vec3::ZERO,
-            thin: false,
-        })
-    }
-
-    fn leaf(&self, tree: u32, met: &crate::rays::Met, direction: DVec3) -> Met {
-        let leaf = self.grove.leaf(tree, met, direction);
-        Met {
-            at: leaf.point.as_dvec3(),
-            normal: leaf.normal,
-            step: leaf.step,
-            reflectance: leaf.reflectance,
-            transmittance: leaf.transmittance,
-            thin: leaf.thin,
-        }
-    }
-
-    /// Whether a way up is free.
-    fn open(&self, from: DVec3, direction: DVec3, stack: &mut Stack) -> bool {
-        direction.z > 0.0 && !self.grove.occluded(from.as_vec3(), direction.as_vec3(), stack)
-    }
-
-    /// Whether nothing is on a way of so many metres.
-    fn free(&self, from: DVec3, direction: DVec3, metres: f64, stack: &mut Stack) -> bool {
-        self.grove.nearest(from.as_vec3(), direction.as_vec3(), metres as f32, stack).is_none()
-    }
-
-    /// Radiance that a surface sends where a path came from, per irradiance of the sun, straight from it.
-    fn sent(&self, met: &Met, sun: DVec3, stack: &mut Stack) -> Vec3 {
-        let cosine = met.normal.dot(sun);
-        let scattered = if cosine > 0.0 { met.reflectance } else { met.transmittance };
-        let from = met.at + met.normal * met.step.copysign(cosine);
-        if scattered != Vec3::ZERO && self.open(from, sun, stack) {
-            scattered * (cosine.abs() * FRAC_1_PI) as f32
-        } else {
-            Vec3::ZERO
-        }
-    }
-
-    /// Light that a surface sends where a path came from, after it met others: of a sun of irradiance 1, and of a sky of radiance 1.
-    fn handed(&self, first: Met, sun: DVec3, stream: &mut Stream, stack: &mut Stack) -> [Vec3; 2] {
-        let (mut met, mut weight) = (first, Vec3::ONE);
-        let mut light = [Vec3::ZERO; 2];
-        for surface in 0..LONGEST {
-            if surface > 0 {
-                light[0] += weight * self.sent(&met, sun, stack);
-            }
-            let Some((from, away)) = scattered(&met, &mut weight, surface >= SURE, stream) else { break };
-            match self.nearest(from, away, stack) {
-                Some(next) => met = next,
-                None => {
-                    light[1] += if surface > 0 && away.z > 0.0 { weight } else { Vec3::ZERO };
-                    break;
-                }
-            }
-        }
-        light
-    }
-}
-
-/// Where a path goes on from a surface; `None` where it ends. Its weight becomes that of what it will meet.
-fn scattered(met: &Met, weight: &mut Vec3, may_end: bool, stream: &mut Stream) -> Option<(DVec3, DVec3)> {
-    let (reflected, passed) = (*weight * met.reflectance, *weight * met.transmittance);
-    let (r, t) = (reflected.element_sum(), passed.element_sum());
-    if r + t <= 0.0 {
-        return None;
-    }
-    let chance = r / (r + t);
-    let through = stream.unit() as f32 >= chance;
-    *weight = if through { passed / (1.0 - chance) } else { reflected / chance };
-    if may_end {
-        // Twice the weight, so that the few bright paths are followed.
-        let sure = (2.0 * weight.max_element()).min(1.0);
-        if stream.unit() as f32 >= sure {
-            return None;
-        }
-        *weight /= sure;
-    }
-    let normal = if through { -met.normal } else { met.normal };
-    Some((met.at + normal * met.step, (normal + sphere(stream)).normalize_or(normal)))
-}
-
-/// Share of the directions in which a surface scatters where the sky is.
-fn open(place: &Place, met: &Met, stream: &mut Stream, stack: &mut Stack) -> f32 {
-    let mut sky = || {
-        let (from, away) = scattered(met, &mut { Vec3::ONE }, false, stream)?;
-        place.open(from, away, stack).then_some(())
-    };
-    (0..SKY_RAYS).filter(|_| sky().is_some()).count() as f32 / SKY_RAYS as f32
-}
-
 /// The same as a tree's z-field has it where a ray at (a, b) of its box goes to `view`: half of the sky visibility there, for leaves of any
 /// orientation. `None` where it shows next to nothing.
 fn field_sky(bake: &SpeciesBake, tree: &Tree, view: DVec3, (a, b): (f64, f64)) -> Option<f32> {
@@ -230,71 +107,6 @@ fn field_sky(bake: &SpeciesBake, tree: &Tree, view: DVec3, (a, b): (f64, f64)) -
     let to = (turned(view) / scale).normalize();
     let seen = zfield::intersect(field, 0, &views::lookup(field.n, to), &Ray { origin, to }, 2);
     (seen.alpha > FAINTEST).then_some(0.5 * seen.occlusion as f32)
-}
-
-/// A direction anywhere. A unit vector more than a normal has the density of the cosine to it.
-fn sphere(stream: &mut Stream) -> DVec3 {
-    let (z, turn) = (2.0 * stream.unit() - 1.0, TAU * stream.unit());
-    let r = (1.0 - z * z).sqrt();
-    DVec3::new(r * turn.cos(), r * turn.sin(), z)
-}
-
-/// A sun's direction, with a density of √z over the solid angle: neither low nor high ones are few.
-fn sun(stream: &mut Stream) -> DVec3 {
-    let (z, turn) = ((1.0 - 0.99 * stream.unit()).powf(2.0 / 3.0), TAU * stream.unit());
-    let r = (1.0 - z * z).sqrt();
-    DVec3::new(r * turn.cos(), r * turn.sin(), z)
-}
-
-/// Sums of a least-squares fit of N coefficients, linear RGB.
-#[derive(Clone, Copy)]
-struct Fit<const N: usize> {
-    h: [[[f64; N]; N]; 3],
-    y: [[f64; N]; 3],
-}
-
-impl<const N: usize> Default for Fit<N> {
-    fn default() -> Self {
-        Fit { h: [[[0.0; N]; N]; 3], y: [[0.0; N]; 3] }
-    }
-}
-
-impl<const N: usize> Fit<N> {
-    /// Adds a sample: `light` is to be `share` of what the terms say.
-    fn add(&mut self, terms: &[f64; N], share: Vec3, light: Vec3) {
-        for c in 0..3 {
-            let (share, light) = (f64::from(share[c]), f64::from(light[c]));
-            for i in 0..N {
-                for j in 0..=i {
-                    self.h[c][i][j] += share * share * terms[i] * terms[j];
-                }
-                self.y[c][i] += share * terms[i] * light;
-            }
-        }
-    }
-
-    fn merge(&mut self, other: &Self) {
-        self.h
-            .iter_mut()
-            .flatten()
-            .flatten()
-            .zip(other.h.iter().flatten().flatten())
-            .for_each(|(a, b)| *a += b);
-        self.y.iter_mut().flatten().zip(other.y.iter().flatten()).for_each(|(a, b)| *a += b);
-    }
-
-    /// The coefficients; none where nothing was seen.
-    fn solve(self) -> [[f32; 3]; N] {
-        let of = |c: usize| {
-            let mut h = self.h[c];
-            // Worth a hundred-thousandth of the samples: only what they cannot tell stays 0.
-            let ridge = 1e-5 * h[0][0];
-            (0..N).for_each(|i| h[i][i] += ridge);
-            least_squares::solve(h, self.y[c], N).unwrap_or([0.0; N])
-        };
-        let rgb = [0, 1, 2].map(of);
-        std::array::from_fn(|i| std::array::from_fn(|c| rgb[c][i] as f32))
-    }
 }
 
 /// What is fitted at one density.
@@ -339,7 +151,7 @@ impl Fits {
     }
 
     /// A ray to the first tree of a place, from anywhere.
-    fn to_tree(&mut self, place: &Place, bake: &SpeciesBake, stream: &mut Stream, stack: &mut Stack) {
+    fn at_tree(&mut self, place: &Place, bake: &SpeciesBake, stream: &mut Stream, stack: &mut Stack) {
         let (view, light) = (sphere(stream), sun(stream));
         let (tree, frame) = (place.grove.trees[0], bake.crown.frame);
         let scale = frame.scale().as_dvec3();
@@ -373,7 +185,7 @@ impl Fits {
     }
 
     /// A ray from the ground, to what sends light there after it met a surface.
-    fn to_ground(&mut self, place: &Place, around: f64, stream: &mut Stream, stack: &mut Stack) {
+    fn at_ground(&mut self, place: &Place, around: f64, stream: &mut Stream, stack: &mut Stack) {
         let (up, light) = ((DVec3::Z + sphere(stream)).normalize_or(DVec3::Z), sun(stream));
         let (r, turn) = (around * stream.unit().sqrt(), TAU * stream.unit());
         let from = DVec3::new(r * turn.cos(), r * turn.sin(), GROUND_STEP);
@@ -384,13 +196,12 @@ impl Fits {
             sums[0] = place.sent(&met, light, stack);
             // What this surface has straight from the sky is light from trees as well.
             let mut weight = Vec3::ONE;
-            let copy = Met { ..met };
             if let Some((o, d)) = scattered(&met, &mut weight, false, stream)
                 && place.open(o, d, stack)
             {
                 sums[1] = weight;
             }
-            let [a, b] = place.handed(copy, light, stream, stack);
+            let [a, b] = place.handed(met, light, stream, stack);
             sums = [sums[0] + a, sums[1] + b];
         }
         self.ground_sun.add(&[1.0, light.z, light.z * light.z], Vec3::ONE, sums[0]);
@@ -454,10 +265,10 @@ fn at_density(
             let (mut stream, mut stack) = (Stream::new(hash2(SEED + 1 + node, k)), Stack::new());
             let mut fits = Fits { bark, ..Fits::default() };
             for _ in 0..CHUNK {
-                fits.to_tree(tree, bake, &mut stream, &mut stack);
+                fits.at_tree(tree, bake, &mut stream, &mut stack);
             }
             for _ in 0..CHUNK / GROUND_RAYS {
-                fits.to_ground(ground, 0.25 * radius, &mut stream, &mut stack);
+                fits.at_ground(ground, 0.25 * radius, &mut stream, &mut stack);
             }
             fits
         })
