@@ -78,6 +78,13 @@ float range_fade(SeedQuad q, Seed s, vec3 centre, Species kind, float relative) 
     return max(near, silhouette_opacity(clearance, height) * tree_fade(relative / view.v.silhouette_ratio, u));
 }
 
+// Unit normal of the ground that a tree stands on, and the density at which its species alone would cover what all trees there do.
+vec3 ground_of(Seed s) { return normalize(vec3(-unpackHalf2x16(s.slope), 1.0)); }
+float density_of(Seed s) {
+    float root = unpackHalf2x16(s.species_density).y;
+    return root * root;
+}
+
 Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     View v = view.v;
     Tree t;
@@ -106,9 +113,8 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     vec3 eye = (back * -centre) / (kind.scale_to_metres * s.scale);
     float inside = max(length(eye.xy), abs(eye.z));
     t.fade = range_fade(q, s, centre, kind, relative) * smoothstep(1.05, 1.35, inside);
-    vec3 ground = normalize(vec3(-unpackHalf2x16(s.slope), 1.0));
-    float density = unpackHalf2x16(s.species_density).y;
-    density *= density;
+    vec3 ground = ground_of(s);
+    float density = density_of(s);
     float tint = 1.0 + 0.3 * (float(s.turn_tint >> 16u) / 65535.0 - 0.5);
     float phase_angle = angle_between(to_camera, v.sun_direction);
     vec3 phase = leaf_phase(to_camera, v.sun_direction, turned_reflectance(kind.reflectance, kind.turning, phase_angle), kind.transmittance);
@@ -164,10 +170,7 @@ void main() {
     uint index = counts.items[group] + rank_in(0u, thread);
     Tree t = make_tree(q, s, tree_centre(view.v, q, s, kind), kind);
     trees.items[index] = t;
-    if (INDIRECT) {
-        float density = unpackHalf2x16(s.species_density).y;
-        handed_light.items[index] = handed_on(t, kind, normalize(vec3(-unpackHalf2x16(s.slope), 1.0)), density * density * kind.mean_area);
-    }
+    if (INDIRECT) handed_light.items[index] = handed_on(t, kind, ground_of(s), density_of(s) * kind.mean_area);
     uint list = 1u + (seen & 31u);
     lists.items[starts.items[list] + counts.items[list * p.group_count + group] + rank_in(list, thread)] = index;
 }

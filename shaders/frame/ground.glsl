@@ -72,8 +72,7 @@ GroundLight ground_light(GroundPoint at, vec3 n) {
         IndirectAt between_nodes = indirect_at(here, texelFetch(indirect, 0).w, INDIRECT_NODES);
         sky += reflectance * indirect_ground_sky(indirect, between_nodes) * view.v.sky_radiance;
         if (HAS_SUN) {
-            float facing = smoothstep(0.0, 0.0349, dot(n, view.v.sun_direction));
-            sun += (reflectance * facing) * indirect_ground_sun(indirect, between_nodes, view.v.sun_direction.z) * view.v.sun_irradiance;
+            sun += (reflectance * sun_facing(view.v.sun_direction, n)) * indirect_ground_sun(indirect, between_nodes, view.v.sun_direction.z) * view.v.sun_irradiance;
         }
     }
     g.sun = mix(max(at.tree_sun.rgb, 0.0), sun, open);

@@ -1,7 +1,8 @@
 // Light that met more than one surface, from the nodes of a species' forest. Twin: src/physics/indirect.rs, where what the terms are is told.
 // A node has its coefficients one after the other, a texel each.
 
-const int INDIRECT_SUN = 10, INDIRECT_NEAR_SUN = 15, INDIRECT_SKY = 3, INDIRECT_NEAR = 20, INDIRECT_FAR = 36, INDIRECT_NODE = 49;
+// Terms of the sun; and where in a node the sky's on near trees begin, the open sky's, and far trees'; and how many there are.
+const int INDIRECT_SUN = 10, INDIRECT_SKY = 15, INDIRECT_OPEN = 20, INDIRECT_FAR = 36, INDIRECT_NODE = 49;
 const int INDIRECT_GROUND = 4;       // texels of a node of the ground
 const float INDIRECT_NAMED = 0.5;    // height at which a tree's light has its colour
 
@@ -54,7 +55,7 @@ Handed indirect_near_sun(samplerBuffer nodes, int base, IndirectAt at, float v, 
 
 Handed indirect_near_sky(samplerBuffer nodes, int base, IndirectAt at, float v) {
     vec3 c[5];
-    for (int i = 0; i < 5; i++) c[i] = indirect_coefficient(nodes, base, at, INDIRECT_NODE, INDIRECT_NEAR_SUN + i);
+    for (int i = 0; i < 5; i++) c[i] = indirect_coefficient(nodes, base, at, INDIRECT_NODE, INDIRECT_SKY + i);
     return handed_by(c[0] + v * (c[1] + v * c[2]), c[3], c[4]);
 }
 
@@ -64,7 +65,7 @@ vec4 indirect_open(samplerBuffer nodes, int base, IndirectAt at, float v) {
     vec4 open, sides = vec4(1.0 - up, (1.0 - up) * v, up, up * v);
     for (int k = 0; k < 4; k++) {
         vec3 c = vec3(0.0);
-        for (int s = 0; s < 4; s++) c += sides[s] * indirect_coefficient(nodes, base, at, INDIRECT_NODE, INDIRECT_NEAR + 4 * s + k);
+        for (int s = 0; s < 4; s++) c += sides[s] * indirect_coefficient(nodes, base, at, INDIRECT_NODE, INDIRECT_OPEN + 4 * s + k);
         open[k] = min(max(c.x, 0.0) / max(c.y, 1e-6), 4.0);
     }
     return open;

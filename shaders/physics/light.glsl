@@ -5,6 +5,9 @@ const float PI = 3.141592653589793;
 // Angle between two unit vectors. atan2 keeps its precision at 0 and pi, where acos loses it.
 float angle_between(vec3 a, vec3 b) { return atan(length(cross(a, b)), dot(a, b)); }
 
+// 1 where the sun is above the slope's horizon, smoothly 0 within two degrees of it. Twin: src/physics/tables.rs.
+float sun_facing(vec3 l, vec3 n) { return smoothstep(0.0, 0.0349, dot(l, n)); }
+
 // Reflectance of a crown at a phase angle: seen from beside the light, more of its leaves show their unlit side than uniform
 // ones would.
 vec3 turned_reflectance(vec3 reflectance, float turning, float angle) { return reflectance * max(1.0 + turning * angle, 0.0); }

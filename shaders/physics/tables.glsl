@@ -6,9 +6,6 @@
 
 const float TABLE_MAX_ANGLE = 1.5358897417550099; // 88 degrees
 
-// 1 where the sun is above the slope's horizon, smoothly 0 within two degrees of it.
-float sun_facing(vec3 l, vec3 n) { return smoothstep(0.0, 0.0349, dot(l, n)); }
-
 // Zenith angles of viewer and light and their relative azimuth in scaled space (BN12, eq. 2-4): S scales the vertical
 // by k, which makes crowns spheres. Where an angle is 0 there is no azimuth: 0 then.
 struct TableAngles {

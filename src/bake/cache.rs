@@ -3,7 +3,7 @@
 //! - `.zfield`, the depth views with their occlusion, and the measured crown and optics: of the model and the knobs of views. All
 //!   else is made from these.
 //! - `.transfer`, the light transfer of the views: of these and of the number of bands, whose coefficients are fitted together.
-//! - `.indirect`, light that met more than one surface ([`super::indirect`]): of a forest: its
+//! - `.indirect`, light that met more than one surface ([`super::indirect`]): of a forest, its
 //!   models, their reflectances and densities, and the ground.
 //! - `.envelopes`, the crown around each leaf ([`super::envelope`]): of the model and of the number of directions.
 //! - `.forest`, the tables of far forests ([`super::tables`]): of both.

@@ -253,14 +253,7 @@ mod tests {
     /// Leaves of half a metre, apart from each other, under a roof; or without it.
     fn envelopes(roof: bool) -> Envelopes {
         let mut mesh = Mesh::default();
-        mesh.materials.push(Material {
-            name: "leaf".into(),
-            foliage: true,
-            base_color: [1.0; 4],
-            texture: None,
-            alpha_cutoff: None,
-            double_sided: true,
-        });
+        mesh.materials.push(Material::leaf());
         square(&mut mesh, [0.0, 1.0], 0.25);
         square(&mut mesh, [10.0, 1.0], 0.25);
         square(&mut mesh, [0.0, 0.0], 0.01);

@@ -73,15 +73,7 @@ mod tests {
 
     #[test]
     fn a_board_hides_its_area_from_below_and_a_wall_its_shadow() {
-        let material = |name: &str| Material {
-            name: name.into(),
-            foliage: true,
-            base_color: [1.0; 4],
-            texture: None,
-            alpha_cutoff: None,
-            double_sided: true,
-        };
-        let mut mesh = Mesh { materials: vec![material("leaf")], ..Mesh::default() };
+        let mut mesh = Mesh { materials: vec![Material::leaf()], ..Mesh::default() };
         let mut square = |corners: [[f32; 3]; 4]| {
             let base = mesh.positions.len() as u32;
             for p in corners {

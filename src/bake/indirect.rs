@@ -1,10 +1,11 @@
 //! Light that met more than one surface ([`crate::physics::indirect`]), measured by paths through a forest of a species' meshes.
 //!
-//! Rays from viewers in random directions, above the forest or on its ground, meet a tree that stands among others, and from there paths go on as light came: at every surface but the
-//! first they ask for the sun, and what leaves for the sky without meeting another surface counts for that. The ground is level, with the scene's
+//! Rays from viewers in random directions, above the forest or on its ground, meet a tree that stands among others, and from there paths go
+//! on as light came: at every surface but the first they ask for the sun, and what leaves for the sky without meeting another surface counts for that. The ground is level, with the scene's
 //! mean reflectance. What a path brings, per irradiance of a sun in a random place, is a sample of L at this view, sun and height;
 //! coefficients are what makes Σ (L − Σ c Y)² least. A path's light varies by about twice its mean, and 131,072 rays for
-//! `table_rays` = 2048, of which four tenths meet the tree, leave less than two hundredths of it to each of fifteen coefficients.
+//! `table_rays` = 2048, of which in a dense forest an eighth meet
+//! what such a viewer sees of the tree, leave less than two hundredths of it to each of fifteen coefficients.
 
 mod fit;
 mod place;
@@ -16,11 +17,12 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use self::fit::Fit;
-use self::place::{GROUND_STEP, Place, open, scattered, sphere, sun};
+use self::place::{GROUND_STEP, Place, open, scattered, sphere};
 use super::SpeciesBake;
 use super::foliage::Foliage;
 use super::grove::{Grove, Tree};
-use super::tables::{ForestSettings, Patch, mean_area};
+use super::self_shadow::direction;
+use super::tables::{ForestSettings, Patch, mean_area, whole_patches};
 use crate::Result;
 use crate::physics::hash::{Stream, hash2};
 use crate::physics::indirect::{
@@ -94,8 +96,8 @@ impl Mix<'_> {
     }
 }
 
-/// The same as a tree's z-field has it where a ray at (a, b) of its box goes to `view`: half of the sky visibility there, for leaves of any
-/// orientation. `None` where it shows next to nothing.
+/// What of the light that leaves scatter comes from the sky, as a tree's z-field has it where a ray at (a, b) of its box goes to `view`: half of
+/// the sky visibility there, for leaves of any orientation. `None` where it shows next to nothing.
 fn field_sky(bake: &SpeciesBake, tree: &Tree, view: DVec3, (a, b): (f64, f64)) -> Option<f32> {
     let field = &bake.views;
     let [c, s] = tree.turn.map(f64::from);
@@ -152,7 +154,7 @@ impl Fits {
 
     /// A ray to the first tree of a place, from anywhere.
     fn at_tree(&mut self, place: &Place, bake: &SpeciesBake, stream: &mut Stream, stack: &mut Stack) {
-        let (view, light) = (sphere(stream), sun(stream));
+        let (view, light) = (sphere(stream), direction(stream));
         let (tree, frame) = (place.grove.trees[0], bake.crown.frame);
         let scale = frame.scale().as_dvec3();
         let basis = Basis::new((view / scale).normalize());
@@ -186,7 +188,7 @@ impl Fits {
 
     /// A ray from the ground, to what sends light there after it met a surface.
     fn at_ground(&mut self, place: &Place, around: f64, stream: &mut Stream, stack: &mut Stack) {
-        let (up, light) = ((DVec3::Z + sphere(stream)).normalize_or(DVec3::Z), sun(stream));
+        let (up, light) = ((DVec3::Z + sphere(stream)).normalize_or(DVec3::Z), direction(stream));
         let (r, turn) = (around * stream.unit().sqrt(), TAU * stream.unit());
         let from = DVec3::new(r * turn.cos(), r * turn.sin(), GROUND_STEP);
         let mut sums = [Vec3::ZERO; 2];
@@ -216,11 +218,15 @@ impl Fits {
 pub fn measure(mix: &Mix, species: usize, quiet: bool) -> Result<Indirect> {
     let foliage = mix.kinds.iter().map(|k| Ok(Arc::new(Foliage::new(k.mesh, k.optics)?)));
     let foliage = foliage.collect::<Result<Vec<_>>>()?;
+    let settings =
+        ForestSettings { pattern_density: mix.density(), poisson: mix.poisson, ..ForestSettings::default() };
+    let patches = whole_patches(&settings, PLACES);
     let count = mix.nodes as usize;
     let progress = Progress::new("measuring light between leaves", count as u64, quiet);
     let nodes = (0..count)
         .map(|j| {
-            let node = at_density((mix, &foliage), species, density_node(count, j, mix.density()), j as u32);
+            let density = density_node(count, j, mix.density());
+            let node = at_density((mix, &foliage, &patches), species, density, j as u32);
             progress.step(1);
             node
         })
@@ -231,7 +237,7 @@ pub fn measure(mix: &Mix, species: usize, quiet: bool) -> Result<Indirect> {
 
 /// The coefficients of a species at a density of all, trees per m².
 fn at_density(
-    (mix, foliage): (&Mix, &[Arc<Foliage>]),
+    (mix, foliage, patches): (&Mix, &[Arc<Foliage>], &[Patch]),
     species: usize,
     density: f64,
     node: u32,
@@ -243,14 +249,9 @@ fn at_density(
         .into_par_iter()
         .map(|k| {
             let mut stream = Stream::new(hash2(SEED ^ node, k));
-            let forest = ForestSettings {
-                pattern_density: mix.density(),
-                poisson: mix.poisson,
-                ..ForestSettings::default()
-            };
-            let patch = Patch::of(&forest, k);
+            let patch = &patches[k as usize];
             [Some(species), None].map(|about| {
-                let trees = standing(mix, (&patch, density / mix.density()), radius, about, &mut stream);
+                let trees = standing(mix, (patch, density / mix.density()), radius, about, &mut stream);
                 Place { grove: Grove::new(foliage.to_vec(), trees), ground: Vec3::from(mix.ground) }
             })
         })
@@ -345,15 +346,7 @@ mod tests {
 
     /// A level board of 4 m² at 8 m, and a speck on the ground under it, so that a tree is 8 m high.
     fn board() -> Mesh {
-        let leaf = Material {
-            name: "leaf".into(),
-            foliage: true,
-            base_color: [1.0; 4],
-            texture: None,
-            alpha_cutoff: None,
-            double_sided: true,
-        };
-        let mut mesh = Mesh { materials: vec![leaf], ..Mesh::default() };
+        let mut mesh = Mesh { materials: vec![Material::leaf()], ..Mesh::default() };
         mesh.positions = vec![
             [-1.0, -1.0, 8.0],
             [1.0, -1.0, 8.0],

@@ -211,17 +211,6 @@ mod tests {
     use crate::scene::mesh::Triangle;
     use crate::scene::{Material, Mesh};
 
-    fn material() -> Material {
-        Material {
-            name: "leaf".into(),
-            foliage: true,
-            base_color: [1.0; 4],
-            texture: None,
-            alpha_cutoff: None,
-            double_sided: true,
-        }
-    }
-
     fn quad(mesh: &mut Mesh, corner: Vec3, a: Vec3, b: Vec3) {
         let base = mesh.positions.len() as u32;
         for p in [corner, corner + a, corner + a + b, corner + b] {
@@ -251,7 +240,7 @@ mod tests {
     #[test]
     fn a_roof_hides_the_sky_and_a_wall_half_of_it() {
         // A wide roof at 1 m and a floor of leaves under it; edges are far away from the axis.
-        let mut mesh = Mesh { materials: vec![material()], ..Mesh::default() };
+        let mut mesh = Mesh { materials: vec![Material::leaf()], ..Mesh::default() };
         let wide = |z| Vec3::new(-50.0, -50.0, z);
         quad(&mut mesh, wide(2.0), Vec3::X * 100.0, Vec3::Y * 100.0);
         quad(&mut mesh, wide(0.1), Vec3::X * 100.0, Vec3::Y * 100.0);
@@ -263,7 +252,7 @@ mod tests {
         assert_eq!(seen(Vec3::new(0.0, 0.0, 2.5)), 1.0);
         assert_eq!(seen(Vec3::new(0.0, 0.0, -1.0)), 0.0, "under the ground");
 
-        let mut mesh = Mesh { materials: vec![material()], ..Mesh::default() };
+        let mut mesh = Mesh { materials: vec![Material::leaf()], ..Mesh::default() };
         quad(&mut mesh, Vec3::new(0.0, -500.0, 0.0), Vec3::Y * 1000.0, Vec3::Z * 500.0);
         quad(&mut mesh, Vec3::new(-1.0, 0.0, 0.0), Vec3::X, Vec3::Z);
         let (surface, _) = bake(&mesh, 8);
@@ -276,7 +265,7 @@ mod tests {
     #[test]
     fn a_solid_hides_half_the_sky_from_its_own_skin() {
         // A closed box as a trunk.
-        let mut mesh = Mesh { materials: vec![material()], ..Mesh::default() };
+        let mut mesh = Mesh { materials: vec![Material::leaf()], ..Mesh::default() };
         let (x, y, z) = (Vec3::X * 2.0, Vec3::Y * 2.0, Vec3::Z * 20.0);
         let low = Vec3::new(-1.0, -1.0, 0.0);
         // Wound so that the corners run anticlockwise from outside.
@@ -296,7 +285,7 @@ mod tests {
     #[test]
     fn interpolation_agrees_with_rays_from_the_surface() {
         // A ball of 400 random cards.
-        let mut mesh = Mesh { materials: vec![material()], ..Mesh::default() };
+        let mut mesh = Mesh { materials: vec![Material::leaf()], ..Mesh::default() };
         let random = |i: u32| sky_direction(i % 97, 97, i) * if i.is_multiple_of(2) { 1.0 } else { -1.0 };
         for i in 0..400 {
             let centre = random(i) * 4.0 * ((i as f32 + 1.0) / 400.0).cbrt() + Vec3::Z * 5.0;

@@ -11,7 +11,7 @@ use crate::ladder::Ladder;
 use crate::physics::indirect::Indirect;
 use crate::physics::tables::ForestTables;
 use crate::plan::Plan;
-use crate::scene::{Distribution, Scene, Species};
+use crate::scene::{Distribution, Scene};
 
 /// One species, ready to draw.
 #[derive(Clone, Debug)]
@@ -118,9 +118,10 @@ pub fn load_or_bake_scene(
 ) -> Result<Vec<(Baked, BakedFrom)>> {
     let _bake = tracing::info_span!("bake").entered();
     let needs = needs.into();
-    let mut all = Vec::new();
+    let (mut all, mut keys) = (Vec::new(), Vec::new());
     for (k, s) in scene.species.iter().enumerate().filter(|_| needs.trees) {
         let source = Source::new(&s.mesh, &s.optics, &(&scene.settings).into(), dir, quiet)?;
+        keys.push(source.views_key());
         let (mut species, views) = source.load_views()?;
         let mut transfer = if needs.transfer { source.load_transfer(&mut species)? } else { None };
         let (measured, tables) =
@@ -137,7 +138,7 @@ pub fn load_or_bake_scene(
         all.push((one, BakedFrom { views, transfer, tables, envelopes, indirect: None }));
     }
     if needs.trees && needs.indirect && scene.settings.indirect > 0 {
-        load_indirect_light(scene, &mut all, dir, quiet)?;
+        load_indirect_light(scene, (&mut all, &keys), dir, quiet)?;
     }
     Ok(all)
 }
@@ -145,25 +146,22 @@ pub fn load_or_bake_scene(
 /// Light that met more than one surface in a scene's forest, which is measured among trees of all its species.
 fn load_indirect_light(
     scene: &Scene,
-    baked: &mut [(Baked, BakedFrom)],
+    (baked, keys): (&mut [(Baked, BakedFrom)], &[[u8; 32]]),
     dir: Option<&Path>,
     quiet: bool,
 ) -> Result<()> {
     let bakes: Vec<Arc<SpeciesBake>> = baked.iter().map(|(b, _)| b.species.clone()).collect();
-    let kind = |(s, bake)| {
-        let s: &Species = s;
-        Ok(Kind {
-            mesh: &s.mesh,
-            optics: &s.optics,
-            bake,
-            key: Source::new(&s.mesh, &s.optics, &(&scene.settings).into(), dir, quiet)?.views_key(),
-            // A scene without trees still has species: any density will do.
-            density: s.full_density(scene.terrain.extent).max(1e-6),
-            scale: s.scale,
-        })
-    };
+    let kinds = scene.species.iter().enumerate().map(|(k, s)| Kind {
+        mesh: &s.mesh,
+        optics: &s.optics,
+        bake: &bakes[k],
+        key: keys[k],
+        // A scene without trees still has species: any density will do.
+        density: s.full_density(scene.terrain.extent).max(1e-6),
+        scale: s.scale,
+    });
     let mix = Mix {
-        kinds: scene.species.iter().zip(bakes.iter().map(Arc::as_ref)).map(kind).collect::<Result<_>>()?,
+        kinds: kinds.collect(),
         ground: scene.terrain.mean_albedo(),
         nodes: scene.settings.table_densities,
         rays: scene.settings.table_rays,

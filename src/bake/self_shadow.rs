@@ -214,7 +214,7 @@ fn turned(samples: &[Sample]) -> Turned {
 
 /// A direction of the upper hemisphere, with a density of √z over the solid angle: between that and the projected one, so that neither
 /// suns and views along the ground nor those from above are few.
-fn direction(stream: &mut Stream) -> DVec3 {
+pub(super) fn direction(stream: &mut Stream) -> DVec3 {
     let (z, turn) = ((1.0 - 0.99 * stream.unit()).powf(2.0 / 3.0), TAU * stream.unit());
     let r = (1.0 - z * z).sqrt();
     DVec3::new(r * turn.cos(), r * turn.sin(), z)

@@ -287,14 +287,7 @@ pub fn ball(thickness: f64) -> Mesh {
     // τ = ρ A / 2 (BBP08 eq. 5), and ρ the leaves over the ball's volume.
     let area = thickness / radius * 2.0 * (4.0 / 3.0 * PI * f64::powi(radius, 3)) / f64::from(count);
     let mut mesh = Mesh {
-        materials: vec![Material {
-            name: "leaf".into(),
-            foliage: true,
-            base_color: [0.18, 0.18, 0.18, 1.0],
-            texture: None,
-            alpha_cutoff: None,
-            double_sided: true,
-        }],
+        materials: vec![Material { base_color: [0.18, 0.18, 0.18, 1.0], ..Material::leaf() }],
         ..Mesh::default()
     };
     let mut direction = || {

@@ -46,6 +46,20 @@ pub struct Material {
     pub double_sided: bool,
 }
 
+impl Material {
+    /// A leaf without texture, white and seen from both sides.
+    pub fn leaf() -> Self {
+        Material {
+            name: "leaf".into(),
+            foliage: true,
+            base_color: [1.0; 4],
+            texture: None,
+            alpha_cutoff: None,
+            double_sided: true,
+        }
+    }
+}
+
 /// An RGBA image, 8 bits, sRGB colour and linear opacity; row 0 is the top, texture coordinate v = 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {

@@ -76,7 +76,7 @@ TreeParts tree_light(sampler2DArray views, sampler2DArray shadow_map, sampler2DA
                      float height, LightRay ray, LightQuality quality) {
     TreeParts light = TreeParts(t.mean_sun, t.mean_sky, quality.sun ? t.mean_lit : 0.0);
     // Under the crown there is only bark; half a metre or so of transition.
-    vec3 colour = t.own * mix(t.bark_ratio, vec3(1.0), smoothstep(t.bare_below - 0.05, t.bare_below + 0.05, height));
+    vec3 surface = mix(t.bark_ratio, vec3(1.0), smoothstep(t.bare_below - 0.05, t.bare_below + 0.05, height)), colour = t.own * surface;
     if (quality.sun) {
         float metres = quality.iterations > 0 ? light_entry(views, ray, mip, quality.iterations, magnified) : 0.0;
         float through = self_shadow(t.leaf, t.extinction, metres);
@@ -103,9 +103,8 @@ TreeParts tree_light(sampler2DArray views, sampler2DArray shadow_map, sampler2DA
     float others = quality.indirect ? open_at(unpack_open(t.open), height) : 1.0 / (1.0 + below_top * below_top * t.hole);
     light.sky += t.sky * colour * (at.occlusion * others);
     if (quality.indirect) {
-        vec3 bark = mix(t.bark_ratio, vec3(1.0), smoothstep(t.bare_below - 0.05, t.bare_below + 0.05, height));
-        light.sun += handed_at(t.handed.xy, height) * bark;
-        light.sky += handed_at(t.handed.zw, height) * bark;
+        light.sun += handed_at(t.handed.xy, height) * surface;
+        light.sky += handed_at(t.handed.zw, height) * surface;
     }
     return light;
 }

@@ -148,10 +148,3 @@ pub(super) fn sphere(stream: &mut Stream) -> DVec3 {
     let r = (1.0 - z * z).sqrt();
     DVec3::new(r * turn.cos(), r * turn.sin(), z)
 }
-
-/// A sun's direction, with a density of √z over the solid angle: neither low nor high ones are few.
-pub(super) fn sun(stream: &mut Stream) -> DVec3 {
-    let (z, turn) = ((1.0 - 0.99 * stream.unit()).powf(2.0 / 3.0), TAU * stream.unit());
-    let r = (1.0 - z * z).sqrt();
-    DVec3::new(r * turn.cos(), r * turn.sin(), z)
-}

@@ -17,7 +17,7 @@ mod trace;
 
 pub use crown::{Cast, CrownModel, LeafOptics, Seen, TransferAt};
 pub use field::{FieldAim, FieldCrown};
-pub(super) use patch::Patch;
+pub(super) use patch::{Patch, whole_patches};
 pub use store::{key, load_or_measure, path};
 
 use crate::bake::SpeciesBake;

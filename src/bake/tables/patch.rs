@@ -72,7 +72,18 @@ fn floor(x: f32) -> i32 {
 pub fn patches(crown: &Crown, forest: &ForestSettings, count: usize) -> Vec<Patch> {
     let density = forest.measured_density(crown);
     let reach = crown.frame.half_width.max(crown.radius) * forest.scale_range[1];
-    (0..count as u32).map(|k| Patch::at(forest, density, k, reach)).collect()
+    with_density(forest, density, reach, count as u32)
+}
+
+/// The patches of a forest at its pattern's own density, for whoever looks at all trees of one.
+pub fn whole_patches(forest: &ForestSettings, count: u32) -> Vec<Patch> {
+    with_density(forest, forest.pattern_density, f32::MAX, count)
+}
+
+/// Patches of as many trees per m², to look for trees up to `reach` m beside a segment.
+fn with_density(forest: &ForestSettings, density: f64, reach: f32, count: u32) -> Vec<Patch> {
+    let pattern = Pattern::new(TILE_POINTS, SEED);
+    (0..count).map(|k| Patch::of(&pattern, forest, (density, reach), k)).collect()
 }
 
 /// Points of a torus of Wang tiles with edge colours by hash, in tile sides.
@@ -105,16 +116,14 @@ fn poisson(k: u32, mean: f64) -> u32 {
 }
 
 impl Patch {
-    /// Patch `k` of as many trees per m², to look for trees up to `reach` m beside a segment.
-    fn at(forest: &ForestSettings, density: f64, k: u32, reach: f32) -> Self {
-        let pattern = Pattern::new(TILE_POINTS, SEED);
+    fn of(pattern: &Pattern, forest: &ForestSettings, (density, reach): (f64, f32), k: u32) -> Self {
         let tile = (pattern.mean_points() / density).sqrt();
         let mut stream = Stream::new(hash2(SEED, k));
         let points = if forest.poisson {
             let count = poisson(k, pattern.mean_points() * f64::from(TILES * TILES));
             (0..count).map(|_| [(); 2].map(|()| stream.unit() * f64::from(TILES))).collect()
         } else {
-            wang(&pattern, hash2(SEED, k))
+            wang(pattern, hash2(SEED, k))
         };
         let [low, high] = forest.scale_range;
         let trees = points.iter().enumerate().map(|(index, p)| Tree {
@@ -124,11 +133,6 @@ impl Patch {
             index: index as u32,
         });
         Patch::new((tile * f64::from(TILES)) as f32, trees.collect(), reach)
-    }
-
-    /// Patch `k` of a forest at its pattern's own density, all of whose trees are looked at.
-    pub fn of(forest: &ForestSettings, k: u32) -> Self {
-        Patch::at(forest, forest.pattern_density, k, f32::MAX)
     }
 
     fn new(side: f32, trees: Vec<Tree>, reach: f32) -> Self {

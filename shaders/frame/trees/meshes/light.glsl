@@ -150,7 +150,6 @@ vec3 place_of(ivec2 pixel, uint samples) {
     return sum / float(bitCount(samples));
 }
 
-
 void main() {
     uvec2 corner = tile_corner();
     uint column = gl_LocalInvocationIndex;
