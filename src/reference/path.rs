@@ -84,11 +84,11 @@ impl World {
             if surface == last && options.light == Light::Sun {
                 break;
             }
-            let Some((away, through)) = self.scatter(&hit, &mut weight, random) else { break };
+            let Some((away, through)) = scatter(&hit, &mut weight, random) else { break };
             if surface >= SURE {
                 let most = if surface >= LONG { 0.98 } else { 1.0 };
                 let chance = (BOLDNESS * weight.max_element()).min(most);
-                if random.unit() as f32 >= chance {
+                if random.unit() >= f64::from(chance) {
                     break;
                 }
                 weight /= chance;
@@ -114,24 +114,49 @@ impl World {
         }
         sample
     }
+}
 
-    /// Chooses a direction of the light that a surface scatters towards where the path came from, and whether it came through
-    /// the surface; `None` if it is black.
-    fn scatter(&self, hit: &Hit, weight: &mut Vec3, random: &mut Random) -> Option<(DVec3, bool)> {
-        let (reflected, passed) = (*weight * hit.reflectance, *weight * hit.transmittance);
-        let (r, t) = (reflected.element_sum(), passed.element_sum());
-        if r + t <= 0.0 {
-            return None;
-        }
-        let chance = r / (r + t);
-        let through = random.unit() as f32 >= chance;
-        *weight = if through { passed / (1.0 - chance) } else { reflected / chance };
-        let normal = if through { -hit.normal } else { hit.normal };
-        Some((random.cosine_direction(normal), through))
+/// Chooses a direction of the light that a surface scatters towards where the path came from, and whether it came through
+/// the surface; `None` if it is black.
+fn scatter(hit: &Hit, weight: &mut Vec3, random: &mut Random) -> Option<(DVec3, bool)> {
+    let (reflected, passed) = (*weight * hit.reflectance, *weight * hit.transmittance);
+    let (r, t) = (reflected.element_sum(), passed.element_sum());
+    if r + t <= 0.0 {
+        return None;
     }
+    let chance = r / (r + t);
+    // Not rounded to single precision, where the greatest numbers are 1: a surface that lets nothing through would.
+    let through = random.unit() >= f64::from(chance);
+    *weight = if through { passed / (1.0 - chance) } else { reflected / chance };
+    let normal = if through { -hit.normal } else { hit.normal };
+    Some((random.cosine_direction(normal), through))
 }
 
 /// Where a ray starts that leaves a surface, on the side that the path came from or behind it.
 fn leave(hit: &Hit, before: bool) -> DVec3 {
     hit.at + hit.normal * if before { hit.step } else { -hit.step }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_number_sends_a_path_through_an_opaque_surface() {
+        let hit = Hit {
+            t: 1.0,
+            at: DVec3::ZERO,
+            normal: DVec3::Z,
+            step: 1e-3,
+            reflectance: Vec3::splat(0.2),
+            transmittance: Vec3::ZERO,
+            species: None,
+            thin: false,
+        };
+        let mut random = Random::greatest();
+        assert_eq!(random.clone().unit(), 1.0 - f64::EPSILON / 2.0);
+        let mut weight = Vec3::ONE;
+        let (_, through) = scatter(&hit, &mut weight, &mut random).unwrap();
+        assert_eq!((through, weight), (false, Vec3::splat(0.2)));
+    }
 }

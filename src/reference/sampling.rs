@@ -24,6 +24,12 @@ impl Random {
         Random { state: mix(one ^ (u64::from(pixel) << 32 | u64::from(sample))) }
     }
 
+    /// The stream whose first number is the greatest that there is, 1 − 2⁻⁵³.
+    #[cfg(test)]
+    pub fn greatest() -> Self {
+        Random { state: 0x3162_8af6_7b21_31ab }
+    }
+
     /// Uniform in [0, 1), multiples of 2⁻⁵³.
     pub fn unit(&mut self) -> f64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
