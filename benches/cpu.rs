@@ -78,7 +78,14 @@ fn baking(c: &mut Criterion) {
     let mesh = model::load_named(Path::new("builtin:birch"), None).unwrap();
     let (optics, settings) = (
         OpticsOverride::default(),
-        BakeSettings { rings: 3, resolution: 64, occlusion_rays: 16, transfer_bands: 0 },
+        BakeSettings {
+            rings: 3,
+            resolution: 64,
+            occlusion_rays: 16,
+            transfer_bands: 0,
+            light_iterations: 1,
+            transfer_resolution: 32,
+        },
     );
     let mut group = c.benchmark_group("bake");
     group.sample_size(10).measurement_time(Duration::from_secs(8));

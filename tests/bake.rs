@@ -11,7 +11,14 @@ use canopy::physics::{light, transfer, views, zfield};
 use canopy::scene::{Mesh, OpticsOverride, Texture};
 use glam::DVec3;
 
-const SMALL: BakeSettings = BakeSettings { rings: 3, resolution: 64, occlusion_rays: 16, transfer_bands: 0 };
+const SMALL: BakeSettings = BakeSettings {
+    rings: 3,
+    resolution: 64,
+    occlusion_rays: 16,
+    transfer_bands: 0,
+    light_iterations: 1,
+    transfer_resolution: 32,
+};
 
 /// Square cards of side `side`, uniformly placed in a ball of radius `radius` on the ground, uniformly turned.
 fn cloud(cards: u32, radius: f32, side: f32) -> Mesh {
@@ -113,7 +120,14 @@ fn a_ball_is_lit_as_the_moon_is() {
 #[test]
 fn light_transfer_makes_a_lambertian_ball() {
     let mesh = ball(2.0);
-    let settings = BakeSettings { rings: 4, resolution: 64, occlusion_rays: 4, transfer_bands: 2 };
+    let settings = BakeSettings {
+        rings: 4,
+        resolution: 64,
+        occlusion_rays: 4,
+        transfer_bands: 2,
+        light_iterations: 1,
+        transfer_resolution: 32,
+    };
     let bake = bake_species(&mesh, &OpticsOverride::default(), &settings, true).unwrap();
     let frame = bake.crown.frame;
     let scale =
@@ -190,7 +204,14 @@ fn light_transfer_makes_a_lambertian_ball() {
 fn the_law_of_self_shadow_is_that_of_the_mesh() {
     for name in ["oak", "pine"] {
         let mesh = common::real_tree(name);
-        let settings = BakeSettings { rings: 6, resolution: 128, occlusion_rays: 8, transfer_bands: 0 };
+        let settings = BakeSettings {
+            rings: 6,
+            resolution: 128,
+            occlusion_rays: 8,
+            transfer_bands: 0,
+            light_iterations: 1,
+            transfer_resolution: 64,
+        };
         let bake = bake_species(&mesh, &OpticsOverride::default(), &settings, true).unwrap();
         let cells = lit_cells(&mesh, &bake, 11).unwrap();
         let (c, tau) = (f64::from(bake.crown.leaf_shadow), f64::from(bake.crown.extinction));

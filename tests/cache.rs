@@ -14,7 +14,14 @@ use canopy::bake::{BakeSettings, Baked, BakedFrom, Needs, SpeciesBake, bake_spec
 use canopy::plan::Plan;
 use canopy::scene::{self, Albedo, Mesh, OpticsOverride, Scene, Texture};
 
-const SMALL: BakeSettings = BakeSettings { rings: 1, resolution: 16, occlusion_rays: 1, transfer_bands: 2 };
+const SMALL: BakeSettings = BakeSettings {
+    rings: 1,
+    resolution: 16,
+    occlusion_rays: 1,
+    transfer_bands: 2,
+    light_iterations: 1,
+    transfer_resolution: 8,
+};
 const OPTICS: OpticsOverride = OpticsOverride {
     leaf_reflectance: None,
     leaf_transmittance: None,

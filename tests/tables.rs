@@ -90,7 +90,14 @@ fn spheres() -> &'static ForestTables {
 fn ellipsoids() -> &'static SpeciesBake {
     static BAKE: OnceLock<SpeciesBake> = OnceLock::new();
     BAKE.get_or_init(|| {
-        let settings = BakeSettings { rings: 6, resolution: 64, occlusion_rays: 8, transfer_bands: 0 };
+        let settings = BakeSettings {
+            rings: 6,
+            resolution: 64,
+            occlusion_rays: 8,
+            transfer_bands: 0,
+            light_iterations: 1,
+            transfer_resolution: 32,
+        };
         bake_species(&common::ellipsoid(2.0, 4.0, 24), &Default::default(), &settings, true).unwrap()
     })
 }
@@ -551,7 +558,14 @@ fn slopes_hide_what_single_trees_say() {
 #[test]
 fn fast_rays_agree_with_the_model() {
     let mesh = common::real_tree("oak");
-    let settings = BakeSettings { rings: 4, resolution: 64, occlusion_rays: 4, transfer_bands: 0 };
+    let settings = BakeSettings {
+        rings: 4,
+        resolution: 64,
+        occlusion_rays: 4,
+        transfer_bands: 0,
+        light_iterations: 1,
+        transfer_resolution: 32,
+    };
     let bake = bake_species(&mesh, &Default::default(), &settings, true).unwrap();
     for (resolution, level) in [(64, 0), (32, 1)] {
         for iterations in 1..=3 {

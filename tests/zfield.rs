@@ -9,7 +9,14 @@ use glam::DVec3;
 
 /// An ellipsoid fills the scaled cylinder as the unit sphere, whatever its proportions.
 fn sphere(rings: u32) -> SpeciesBake {
-    let settings = BakeSettings { rings, resolution: 128, occlusion_rays: 16, transfer_bands: 0 };
+    let settings = BakeSettings {
+        rings,
+        resolution: 128,
+        occlusion_rays: 16,
+        transfer_bands: 0,
+        light_iterations: 1,
+        transfer_resolution: 64,
+    };
     bake_species(&common::ellipsoid(3.0, 6.0, 96), &Default::default(), &settings, true).unwrap()
 }
 

@@ -7,7 +7,14 @@ use canopy::bake::{BakeSettings, bake_species, verify};
 
 fn check(name: &str, depth: f64) {
     let mesh = common::real_tree(name);
-    let settings = BakeSettings { rings: 9, resolution: 256, occlusion_rays: 8, transfer_bands: 0 };
+    let settings = BakeSettings {
+        rings: 9,
+        resolution: 256,
+        occlusion_rays: 8,
+        transfer_bands: 0,
+        light_iterations: 1,
+        transfer_resolution: 128,
+    };
     let bake = bake_species(&mesh, &Default::default(), &settings, true).unwrap();
     let report = verify(&mesh, &bake, 10, 2).unwrap();
     for v in &report.views {

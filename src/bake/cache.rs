@@ -95,7 +95,7 @@ impl<'a> Source<'a> {
     ) -> Result<Self> {
         check(settings)?;
         let views = views_key(mesh, optics, settings);
-        let transfer = transfer_key(&views, settings.transfer_bands);
+        let transfer = transfer_key(&views, settings);
         Ok(Source { mesh, optics, settings: *settings, dir, quiet, views, transfer })
     }
 
@@ -126,7 +126,7 @@ impl<'a> Source<'a> {
     /// Those of [`bake_transfer`].
     pub fn load_transfer(&self, bake: &mut SpeciesBake) -> Result<Option<CacheState>> {
         let Some(key) = &self.transfer else { return Ok(None) };
-        let (bands, resolution) = (self.settings.transfer_bands, self.settings.resolution / 2);
+        let (bands, resolution) = (self.settings.transfer_bands, self.settings.transfer_resolution);
         let band: Vec<usize> = level_sizes(self.settings.rings, resolution).collect();
         let (transfer, state) = load_or_build(
             (self.dir, &TRANSFER, key),
@@ -142,7 +142,7 @@ impl<'a> Source<'a> {
                 put(&transfer.sent.coefficients().map(f32::to_le_bytes).concat())?;
                 transfer.bands.iter().flatten().try_for_each(|l| put(l))
             },
-            || bake_transfer(self.mesh, bake, bands, self.quiet),
+            || bake_transfer(self.mesh, bake, &self.settings, self.quiet),
             self.quiet,
         )?;
         bake.transfer = transfer;
@@ -220,12 +220,16 @@ impl<'a> Source<'a> {
 }
 
 /// BLAKE3 of everything that the light transfer of some views depends on; `None` without bands.
-fn transfer_key(views: &[u8; 32], bands: u32) -> Option<[u8; 32]> {
+fn transfer_key(views: &[u8; 32], settings: &BakeSettings) -> Option<[u8; 32]> {
     let mut fields = Fields::new("canopy light transfer");
     fields.put(&TRANSFER.version.to_le_bytes());
-    fields.put(&bands.to_le_bytes());
+    fields.put(&settings.transfer_bands.to_le_bytes());
+    // The half of the views' texels is not named: it is what all had before there was a choice.
+    if 2 * settings.transfer_resolution != settings.resolution {
+        fields.put(&settings.transfer_resolution.to_le_bytes());
+    }
     fields.put(views);
-    (bands > 0).then(|| fields.key())
+    (settings.transfer_bands > 0).then(|| fields.key())
 }
 
 /// Numbers of single precision, as they are kept.
@@ -304,6 +308,10 @@ pub fn views_key(mesh: &Mesh, optics: &OpticsOverride, settings: &BakeSettings) 
         put(rgb.as_ref().map_or(&[], bytemuck::bytes_of));
     }
     put(optics.extinction.as_ref().map_or(&[], bytemuck::bytes_of));
+    // Likewise one iteration is not named: it is what all had before there was a choice.
+    if settings.light_iterations != 1 {
+        put(&settings.light_iterations.to_le_bytes());
+    }
     put_mesh(&mut fields, mesh);
     fields.key()
 }

@@ -367,7 +367,14 @@ mod tests {
         let (mesh, rgb) = (board(), Some([scatters; 3]));
         let optics =
             OpticsOverride { leaf_reflectance: rgb, leaf_transmittance: rgb, ..OpticsOverride::default() };
-        let settings = BakeSettings { rings: 2, resolution: 16, occlusion_rays: 8, transfer_bands: 0 };
+        let settings = BakeSettings {
+            rings: 2,
+            resolution: 16,
+            occlusion_rays: 8,
+            transfer_bands: 0,
+            light_iterations: 1,
+            transfer_resolution: 8,
+        };
         let bake = bake_species(&mesh, &optics, &settings, true).unwrap();
         let kind = Kind { mesh: &mesh, optics: &optics, bake: &bake, key: [0; 32], density, scale: [1.0; 2] };
         let mix = Mix { kinds: vec![kind], ground: [ground; 3], nodes: 2, rays: 512, poisson: true };

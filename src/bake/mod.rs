@@ -129,6 +129,10 @@ pub struct BakeSettings {
     pub occlusion_rays: u32,
     /// Bands of light transfer, 0 to 2.
     pub transfer_bands: u32,
+    /// Iterations of the light ray that self-shadow and light transfer are measured for, 1 or 2.
+    pub light_iterations: u32,
+    /// Texels a side of the light transfer of a view: a power of two, 8 to the view's.
+    pub transfer_resolution: u32,
 }
 
 impl From<&Settings> for BakeSettings {
@@ -138,22 +142,35 @@ impl From<&Settings> for BakeSettings {
             resolution: s.view_resolution,
             occlusion_rays: s.occlusion_rays,
             transfer_bands: s.transfer_bands,
+            light_iterations: s.light_iterations.max(1),
+            transfer_resolution: s.transfer_side(),
         }
     }
 }
 
 /// Refuses settings that no bake can be made with.
 fn check(settings: &BakeSettings) -> Result<()> {
-    let BakeSettings { rings, resolution, occlusion_rays, transfer_bands } = *settings;
+    let BakeSettings {
+        rings,
+        resolution,
+        occlusion_rays,
+        transfer_bands,
+        transfer_resolution,
+        light_iterations,
+    } = *settings;
     if !(1..=16).contains(&rings)
         || !(16..=512).contains(&resolution)
         || !resolution.is_power_of_two()
         || occlusion_rays == 0
         || transfer_bands > 2
+        || !(1..=2).contains(&light_iterations)
+        || !(8..=resolution).contains(&transfer_resolution)
+        || !transfer_resolution.is_power_of_two()
     {
         return Err(Error::Usage(format!(
-            "cannot bake {rings} rings of {resolution} texels with {occlusion_rays} rays and {transfer_bands} bands of transfer: \
-             1 to 16 rings, a power of two from 16 to 512 texels, at least one ray and at most two bands"
+            "cannot bake {rings} rings of {resolution} texels with {occlusion_rays} rays, {light_iterations} iterations of light and \
+             {transfer_bands} bands of transfer of {transfer_resolution} texels: 1 to 16 rings, a power of two from 16 to 512 texels, at \
+             least one ray, 1 or 2 iterations, and at most two bands, of a power of two from 8 to the views' texels"
         )));
     }
     Ok(())
@@ -168,7 +185,7 @@ pub fn bake_species(
     quiet: bool,
 ) -> Result<SpeciesBake> {
     let mut bake = bake_views(mesh, optics, settings, quiet)?;
-    bake.transfer = bake_transfer(mesh, &bake, settings.transfer_bands, quiet)?;
+    bake.transfer = bake_transfer(mesh, &bake, settings, quiet)?;
     Ok(bake)
 }
 
@@ -191,13 +208,20 @@ pub fn bake_views(
     let progress = Progress::new("baking views", u64::from(count), quiet);
     let field = views::draw(&surface, &occlusion, settings.rings, settings.resolution, &progress);
     progress.finish();
-    Ok(optics::species(mesh, &surface, field, optics))
+    Ok(optics::species(mesh, &surface, field, optics, settings.light_iterations))
 }
 
-/// Bakes the light transfer of a species' views, in `bands` bands.
+/// Bakes the light transfer of a species' views, in as many bands as the settings say.
 ///
 /// # Errors
 /// [`Error::Usage`] for a mesh without extent.
-pub fn bake_transfer(mesh: &Mesh, bake: &SpeciesBake, bands: u32, quiet: bool) -> Result<Transfer> {
-    Ok(transfer::draw(mesh, &Surface::new(mesh)?, bake, bands, quiet))
+pub fn bake_transfer(
+    mesh: &Mesh,
+    bake: &SpeciesBake,
+    settings: &BakeSettings,
+    quiet: bool,
+) -> Result<Transfer> {
+    let BakeSettings { transfer_bands, transfer_resolution, light_iterations, .. } = *settings;
+    let how = (transfer_bands, transfer_resolution, light_iterations);
+    Ok(transfer::draw(mesh, &Surface::new(mesh)?, bake, how, quiet))
 }

@@ -178,13 +178,18 @@ impl Scatter {
     }
 }
 
-/// The transfer of all views of a species, in `bands` bands.
-pub fn draw(mesh: &Mesh, surface: &Surface, bake: &SpeciesBake, bands: u32, quiet: bool) -> Transfer {
+/// The transfer of all views of a species: bands, texels a side of a view, and iterations of the light ray.
+pub fn draw(
+    mesh: &Mesh,
+    surface: &Surface,
+    bake: &SpeciesBake,
+    (bands, resolution, light_iterations): (u32, u32, u32),
+    quiet: bool,
+) -> Transfer {
     if bands == 0 {
         return Transfer::default();
     }
-    let resolution = bake.views.resolution / 2;
-    let field = FieldCrown::new(bake, FIELD, 1, 1);
+    let field = FieldCrown::new(bake, FIELD, 1, light_iterations);
     let suns = suns(surface, &field);
     let points = Points::new(surface, &suns, resolution, quiet);
     let scatter = Scatter::new(mesh, surface, bake);

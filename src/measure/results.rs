@@ -107,8 +107,14 @@ impl SceneIdentity {
         let terrain = &scene.terrain;
         let heights = terrain.heights.as_ref().map_or(&[][..], |r| &r.samples);
         put("terrain".into(), &(terrain.extent, terrain.cell_size), bytemuck::cast_slice(heights));
-        let fixed =
-            crate::bake::BakeSettings { rings: 1, resolution: 16, occlusion_rays: 8, transfer_bands: 0 };
+        let fixed = crate::bake::BakeSettings {
+            rings: 1,
+            resolution: 16,
+            occlusion_rays: 8,
+            transfer_bands: 0,
+            light_iterations: 1,
+            transfer_resolution: 8,
+        };
         for s in &scene.species {
             let model = crate::bake::cache::views_key(&s.mesh, &s.optics, &fixed);
             put(format!("species {}", s.name), &(s.scale, &s.distribution), &model);

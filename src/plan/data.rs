@@ -77,7 +77,7 @@ impl Plan {
         };
         let views = array(resource::VIEWS, s.view_resolution);
         let outlines = Description::Buffer(outlines(s.view_rings, s.view_resolution, count));
-        let band = array(resource::TRANSFER, s.view_resolution / 2);
+        let band = array(resource::TRANSFER, s.transfer_side());
         for species in &scene.species {
             let name = &species.name;
             let reason = format!("species \"{name}\" is drawn tree by tree");

@@ -41,6 +41,7 @@ struct LightQuality {
     bool indirect;      // light of the forest counts
     int iterations;     // to where its light enters the crown
     uint bands;         // of light transfer
+    float coarser;      // levels by which its texels are larger than the views'
 };
 
 struct TreeParts {
@@ -90,8 +91,7 @@ TreeParts tree_light(sampler2DArray views, sampler2DArray shadow_map, sampler2DA
         // From below, views show the other side.
         if (quality.bands > 0u && !below) {
             vec3 shares = at.shares / max(at.shares.x + at.shares.y + at.shares.z, 1e-6);
-            // Half as many texels a side as a view has.
-            float coarser = max(mip - 1.0, 0.0);
+            float coarser = max(mip - quality.coarser, 0.0);
             float x = transfer_fetch(transfer_1, transfer_first(t.toward), p, d, layers, shares, coarser, s);
             if (quality.bands > 1u) x += transfer_fetch(transfer_2, transfer_second(t.toward), p, d, layers, shares, coarser, s);
             reached *= max(1.0 + t.transfer * x, 0.0);

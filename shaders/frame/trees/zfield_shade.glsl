@@ -42,6 +42,7 @@ layout(constant_id = 6) const bool HAS_SUN = true;
 layout(constant_id = 8) const bool CONVERGED = false; // to the average light: nothing of the tree's own is left
 layout(constant_id = 9) const uint TRANSFER_BANDS = 0u;
 layout(constant_id = 10) const bool INDIRECT = false;
+layout(constant_id = 11) const uint TRANSFER_LEVELS = 1u; // by which its texels are larger than the views'
 
 // Returns the species, counted from 1. Sets sample mask and depth. `lit` is the fraction of the sun that arrives.
 uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
@@ -86,7 +87,7 @@ uint shade(out vec3 sun_part, out vec3 sky_part, out float lit) {
                                vec2(own.z, unpackHalf2x16(tree_bits.w).y), bark_ratio.rgb, bark_ratio.w, sky.w,
                                sun.w, own.y, optics.y, sun_from.xyz, sun_from.w, tree_bits.w & 15u, tree_bits.w >> 8u & 255u, handed, handed_sky);
     TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, tree, at, p, d, layers, below, optics.x, MAGNIFIED, s,
-                                 height, ray, LightQuality(HAS_SUN, INDIRECT, LIGHT_ITERATIONS, TRANSFER_BANDS));
+                                 height, ray, LightQuality(HAS_SUN, INDIRECT, LIGHT_ITERATIONS, TRANSFER_BANDS, float(TRANSFER_LEVELS)));
     sun_part = parts.sun;
     sky_part = parts.sky;
     lit = parts.lit;

@@ -127,6 +127,7 @@ impl TreeTiles {
                     ("LIGHT_ITERATIONS", if plan.sun { s.light_iterations } else { 0 }),
                     ("HAS_SUN", u32::from(plan.sun)),
                     ("TRANSFER_BANDS", plan.transfer_bands),
+                    ("TRANSFER_LEVELS", (s.view_resolution / s.transfer_side()).ilog2()),
                     ("INDIRECT", u32::from(plan.indirect > 0)),
                     ("VIEW_MODE", plan.view_mode as u32),
                 ],

@@ -38,6 +38,7 @@ layout(constant_id = 2) const int LIGHT_ITERATIONS = 1;
 layout(constant_id = 3) const bool HAS_SUN = true;
 layout(constant_id = 4) const uint TRANSFER_BANDS = 0u;
 layout(constant_id = 5) const bool INDIRECT = false;
+layout(constant_id = 6) const uint TRANSFER_LEVELS = 1u; // by which its texels are larger than the views'
 
 // What a tree shows to a pixel that sees it, and how deep; `offset` is the pixel's from the image's centre.
 Shown shade(uint rank, vec2 offset, out float depth) {
@@ -92,7 +93,7 @@ Shown shade(uint rank, vec2 offset, out float depth) {
                                 kind.bare_below, plane.half_extent.z, hole.x, kind.leaf_shadow * root, kind.extinction * phase_angle / t.scale, toward,
                                 transfer_strength(root), cascade_of(t), caster_name(t.identity), uvec4(handed.sun, handed.sky), handed.open);
     TreeParts parts = tree_light(views, shadow_map, transfer_1, transfer_2, light, surface, at, to, layers, below, t.mip, magnified,
-                                 s, found.z, ray, LightQuality(HAS_SUN, INDIRECT, LIGHT_ITERATIONS, TRANSFER_BANDS));
+                                 s, found.z, ray, LightQuality(HAS_SUN, INDIRECT, LIGHT_ITERATIONS, TRANSFER_BANDS, float(TRANSFER_LEVELS)));
 #ifdef LAYERS
     return Shown(vec4(parts.sun, 1.0), vec4(parts.sky, 1.0), vec4(0.0, 0.0, parts.lit, 1.0 - parts.lit));
 #else
