@@ -9,6 +9,7 @@ pub(crate) mod foliage;
 pub(crate) mod grove;
 pub mod hiding;
 pub mod indirect;
+pub mod leaves;
 mod least_squares;
 pub(crate) mod occlusion;
 pub(crate) mod optics;

@@ -5,6 +5,7 @@ use half::f16;
 
 use crate::bake::envelope::Envelopes;
 use crate::bake::hiding::{self, HEIGHTS};
+use crate::bake::leaves::leaves;
 use crate::bake::surface::{Face, Mask, Surface};
 use crate::bake::{Baked, SpeciesBake};
 use crate::forest::species::mean_squared_scale;
@@ -77,7 +78,7 @@ impl MeshData {
                         "a species was baked without the crown around its leaves that the plan lists".into(),
                     )
                 })?;
-            all.add(species, envelopes)?;
+            all.add(species, envelopes, plan.wind)?;
         }
         let (pairs, top) = hiding_pairs(scene, baked, rule.len());
         let texels = |name, bytes: &[u8]| -> Result<Buffer> {
@@ -105,7 +106,7 @@ impl MeshData {
 }
 
 impl Content {
-    fn add(&mut self, species: &Species, envelopes: &Envelopes) -> Result<()> {
+    fn add(&mut self, species: &Species, envelopes: &Envelopes, wind: bool) -> Result<()> {
         let mesh = &species.mesh;
         let surface = Surface::new(mesh)?;
         if surface.faces.len() > MESH_TRIANGLES as usize {
@@ -120,12 +121,14 @@ impl Content {
         let first_face = self.faces.len() as u32;
         let first_mask = self.masks.len() as u32;
         let words = 8 * envelope_words(envelopes.directions as u32) as usize;
+        let foliage = |material: u32| !any || mesh.materials[material as usize].foliage;
+        let cards = if wind { leaves(&surface, foliage) } else { Vec::new() };
         for (k, face) in (0u32..).zip(&surface.faces) {
             self.corners.extend(corners(&surface, face));
             self.faces.push(MeshFace {
                 mask: face.mask.map_or(NO_PAGE, |m| first_mask + m),
-                foliage: u32::from(!any || mesh.materials[face.material as usize].foliage),
-                spare: [0; 2],
+                foliage: u32::from(foliage(face.material)),
+                card: cards.get(k as usize).copied().flatten().map_or([0; 2], |leaf| leaf.packed()),
             });
             for around in envelopes.of(k) {
                 let halves = around.iter().map(|t| f16::from_f64(*t));

@@ -11,7 +11,7 @@ const BUILTIN_SECONDS: f64 = 8.0;
 /// Most views of a path.
 const MOST_VIEWS: f64 = 100_000.0;
 
-/// Where the camera is at a time.
+/// Where the camera is at a time, which is the scene's: what the wind moves is as it is then.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Keyframe {
@@ -188,6 +188,11 @@ impl CameraPath {
     /// Seconds from the first keyframe to the last.
     pub fn duration(&self) -> f64 {
         self.keyframes[self.keyframes.len() - 1].time - self.keyframes[0].time
+    }
+
+    /// Time of the scene at one of its views ([`CameraPath::views`]), s.
+    pub fn time_of(&self, view: usize, step: f64) -> f64 {
+        self.keyframes[0].time + view as f64 * step
     }
 
     /// The keyframes.

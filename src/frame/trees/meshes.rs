@@ -45,7 +45,7 @@ impl Meshes {
                 colors: &[vk::Format::R32_UINT],
                 samples: plan.samples,
                 depth: DepthTest::Reverse,
-                constants: &[("SAMPLES", plan.samples)],
+                constants: &[("SAMPLES", plan.samples), ("WIND", u32::from(plan.wind))],
             })?,
             light: gpu.compute(
                 light,
@@ -55,6 +55,7 @@ impl Meshes {
                     ("LEAF_DIRECTIONS", scene.settings.leaf_directions),
                     ("LEAF_POWER", data.power),
                     ("INDIRECT", u32::from(plan.indirect > 0)),
+                    ("WIND", u32::from(plan.wind)),
                     ("VIEW_MODE", plan.view_mode as u32),
                 ],
             )?,

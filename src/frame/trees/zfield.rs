@@ -43,6 +43,7 @@ impl Trees {
                 ("CONVERGED", u32::from(converged)),
                 ("TRANSFER_BANDS", plan.transfer_bands),
                 ("INDIRECT", u32::from(plan.indirect > 0)),
+                ("WIND", u32::from(plan.wind)),
             ];
             if plan.view_mode != ViewMode::Radiance {
                 constants.push(("VIEW_MODE", plan.view_mode as u32));

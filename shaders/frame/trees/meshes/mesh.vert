@@ -4,6 +4,7 @@
 #include "interface.glsl"
 #include "physics/hash.glsl"
 #include "physics/masks.glsl"
+#include "forest/wind.glsl"
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/meshes/seen.glsl"
 #include "frame/trees/meshes/corner.glsl"
@@ -24,10 +25,12 @@ void main() {
     MeshDraw d = draws.items[species];
     uint place = d.first_tree + uint(gl_InstanceIndex), face = uint(gl_VertexIndex) / 3u;
     Tree t = fetch_tree(trees, mesh_trees.items[place]);
-    uvec4 corner = texelFetch(corners, gl_VertexIndex);
-    gl_Position = view.v.clip_from_world * vec4(world_from_model(t, corner_place(corner)), 1.0);
+    uvec4 corner = texelFetch(corners, gl_VertexIndex), is = texelFetch(faces, int(face));
+    vec3 at = corner_place(corner);
+    if (WIND) at = blown(motion_of(view.v), t.species, caster_name(t.identity), is.zw, at);
+    gl_Position = view.v.clip_from_world * vec4(world_from_model(t, at), 1.0);
     uv = corner_uv(corner);
     uint dither = uint(unit(hash(t.identity ^ HASH_DITHER)) * 1024.0);
     uint mask = mesh_mask(mesh_count(t), dither, SAMPLES);
-    what = uvec4(mesh_seen(place, face - d.first_face), mask, texelFetch(faces, int(face)).x, hash2(t.identity, face));
+    what = uvec4(mesh_seen(place, face - d.first_face), mask, is.x, hash2(t.identity, face));
 }
