@@ -129,8 +129,8 @@ impl Shadows {
             .then(|| program(ground, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[]));
         let trees =
             (on && plan.z_fields).then(|| program(trees, &shaders::FRAME_TREES_ZFIELD_SHADOW_FRAG, &views));
-        let meshes =
-            (on && plan.meshes).then(|| program(meshes, &shaders::FRAME_TREES_MESHES_SHADOW_FRAG, &views[2..]));
+        let meshes = (on && plan.meshes)
+            .then(|| program(meshes, &shaders::FRAME_TREES_MESHES_SHADOW_FRAG, &views[2..]));
         let side = SHADOW_CELLS + 1;
         let cells = (0..SHADOW_CELLS * SHADOW_CELLS).map(|k| k % SHADOW_CELLS + side * (k / SHADOW_CELLS));
         let indices: Vec<u32> =

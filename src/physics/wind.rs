@@ -144,7 +144,9 @@ impl Wind {
 
     /// Phases of the waves at a place less those at the origin, in 1/1024 turn, ten bits each.
     pub fn place_phases(&self, x: [f64; 2]) -> u32 {
-        let of = |k: usize| ((wave_turns(k, self.toward(), x).rem_euclid(1.0) * 1024.0).round() as u32 & 1023) << (10 * k);
+        let of = |k: usize| {
+            ((wave_turns(k, self.toward(), x).rem_euclid(1.0) * 1024.0).round() as u32 & 1023) << (10 * k)
+        };
         (0..3).map(of).sum()
     }
 }
@@ -167,7 +169,8 @@ impl Motion {
 
     /// Shear s of a tree, east and north: of its height, m; of what gusts are there; and of its own hash.
     pub fn sway(&self, gusts: f64, height: f64, hash: u32) -> [f64; 2] {
-        let bits = |first: u32, count: u32| f64::from(hash >> first & ((1 << count) - 1)) / f64::from(1u32 << count);
+        let bits =
+            |first: u32, count: u32| f64::from(hash >> first & ((1 << count) - 1)) / f64::from(1u32 << count);
         let frequency = natural_frequency(height) * (0.85 + 0.3 * bits(0, 8));
         let count = (frequency * PERIOD).round() as u32;
         let along = self.gust * gusts + 0.9 * self.own * sine(self.turns(count) + bits(8, 10));
@@ -209,7 +212,8 @@ pub fn turned(v: [f64; 3], axis: [f64; 3], angle: f64) -> [f64; 3] {
 
 /// A tree's shear as 28 bits, from the fourth of a word on: fourteen an axis, in steps of [`MOST_SHEAR`] / 8191.
 pub fn pack_sway(s: [f64; 2]) -> u32 {
-    let of = |v: f64| (v.clamp(-MOST_SHEAR, MOST_SHEAR) * (8191.0 / MOST_SHEAR)).round() as i32 as u32 & 0x3fff;
+    let of =
+        |v: f64| (v.clamp(-MOST_SHEAR, MOST_SHEAR) * (8191.0 / MOST_SHEAR)).round() as i32 as u32 & 0x3fff;
     of(s[0]) << 4 | of(s[1]) << 18
 }
 

@@ -29,12 +29,16 @@ impl Plan {
         let mut add = |name: &str, reason: &str| items.step("data", name, reason);
         let shear = 100.0 * wind.shear();
         if self.z_fields {
-            let from = format!("wind of {} m/s: trees lean by up to {shear:.1} % of their height", wind.speed);
+            let from =
+                format!("wind of {} m/s: trees lean by up to {shear:.1} % of their height", wind.speed);
             add(pipeline::SWAY, &from);
         }
         if self.meshes {
             let angle = wind.flutter().to_degrees();
-            add(pipeline::FLUTTER, &format!("and leaves of meshes turn by up to {angle:.0} degrees about their middles"));
+            add(
+                pipeline::FLUTTER,
+                &format!("and leaves of meshes turn by up to {angle:.0} degrees about their middles"),
+            );
         }
         if self.ladder.averages() {
             add(pipeline::GUSTS, "and the shader-map is looked up where gusts have moved crowns from");
