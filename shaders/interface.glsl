@@ -249,8 +249,9 @@ struct MeshLightParameters {
 // A triangle of a mesh.
 struct MeshFace {
     uint mask;                        // layer of the array of masks; NO_PAGE: no holes
-    uint foliage;                     // 1: a leaf; 0: bark
-    uvec2 card;                       // of a leaf that flutters in the wind, halves: its middle; two bytes: the axis through it; else 0
+    uint foliage;                     // bit 0: a leaf, else bark; bit 1: it turns in the wind, about an axis of two bytes << 16
+    uint spare;                       // a texel has four words
+    uint middle;                      // of a leaf that turns, in the tree's box, 10 bits an axis
 };
 
 // A tree that casts.

@@ -10,7 +10,6 @@ pub(crate) mod grove;
 pub mod hiding;
 pub mod indirect;
 mod least_squares;
-pub(crate) mod leaves;
 pub(crate) mod occlusion;
 pub(crate) mod optics;
 mod raster;
@@ -19,6 +18,7 @@ mod self_shadow;
 pub(crate) mod surface;
 pub mod tables;
 mod transfer;
+pub(crate) mod turning;
 mod verify;
 mod views;
 

@@ -5,8 +5,8 @@ use half::f16;
 
 use crate::bake::envelope::Envelopes;
 use crate::bake::hiding::{self, HEIGHTS};
-use crate::bake::leaves::leaves;
 use crate::bake::surface::{Face, Mask, Surface};
+use crate::bake::turning::{Turning, turning};
 use crate::bake::{Baked, SpeciesBake};
 use crate::forest::species::mean_squared_scale;
 use crate::gpu::interface::{HIDING_STEPS, MAX_SPECIES, MESH_TRIANGLES, MeshDraw, MeshFace, NO_PAGE};
@@ -121,15 +121,13 @@ impl Content {
         let first_face = self.faces.len() as u32;
         let first_mask = self.masks.len() as u32;
         let words = 8 * envelope_words(envelopes.directions as u32) as usize;
-        let foliage = |material: u32| !any || mesh.materials[material as usize].foliage;
-        let cards = if wind { leaves(&surface, foliage) } else { Vec::new() };
+        let turning = if wind { turning(&surface, &envelopes.parts) } else { Vec::new() };
         for (k, face) in (0u32..).zip(&surface.faces) {
             self.corners.extend(corners(&surface, face));
-            self.faces.push(MeshFace {
-                mask: face.mask.map_or(NO_PAGE, |m| first_mask + m),
-                foliage: u32::from(foliage(face.material)),
-                card: cards.get(k as usize).copied().flatten().map_or([0; 2], |leaf| leaf.packed()),
-            });
+let leaf = u32::from(!any || mesh.materials[face.material as usize].foliage);
+            let [turns, middle] = turning.get(k as usize).copied().flatten().map_or([0; 2], Turning::packed);
+            let mask = face.mask.map_or(NO_PAGE, |m| first_mask + m);
+            self.faces.push(MeshFace { mask, foliage: leaf | turns, spare: 0, middle });
             for around in envelopes.of(k) {
                 let halves = around.iter().map(|t| f16::from_f64(*t));
                 self.envelopes.extend(halves.chain(std::iter::repeat(f16::ZERO)).take(words));

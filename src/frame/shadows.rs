@@ -367,6 +367,7 @@ impl Shadows {
                 ("draws", Resource::Buffer(&meshes.draws)),
                 ("corners", Resource::Texels(&meshes.corners)),
                 ("faces", Resource::Texels(&meshes.faces)),
+                ("species", Resource::Buffer(&trees.species.table)),
                 ("masks", Resource::Texture(&meshes.masks, Sampler::LinearRepeat)),
             ],
         );

@@ -293,6 +293,8 @@ mod tests {
         let views = path.views(0.5).unwrap();
         assert_eq!(views.len(), 8);
         assert_eq!(views[3], path.at(1.5));
+        // The scene's time is that of the keyframes, which begin at one second.
+        assert_eq!([path.time_of(0, 0.5), path.time_of(3, 0.5)], [1.0, 2.5]);
         assert!(path.views(0.0).is_err() && path.views(-1.0).is_err() && path.views(f64::NAN).is_err());
     }
 

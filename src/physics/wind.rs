@@ -43,8 +43,8 @@ const TREE_SPEED: f64 = 20.0;
 const LEAF_SPEED: f64 = 8.0;
 /// Largest angle of a leaf, rad.
 const MOST_FLUTTER: f64 = 0.6;
-/// Reach of the largest leaves that flutter, from their middle, m.
-pub const LARGEST_LEAF: f64 = 0.75;
+/// Bound on the reach of leaves that turn, from what they turn about, over that of their tree to the sides.
+pub const LEAF_REACH: f64 = 0.12;
 
 /// The wind of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,7 +132,7 @@ impl Wind {
     /// Bound on how far anything of a tree is moved that reaches so high and so far to the sides, m.
     pub fn reach(&self, height: f64, radius: f64) -> f64 {
         // What flutters is on a branch, and the shear is of the height to which that has swung.
-        let leaf = self.flutter() * LARGEST_LEAF;
+        let leaf = self.flutter() * LEAF_REACH * radius;
         let branch = self.shear() * radius;
         self.shear() * (height + branch + leaf) + branch + leaf
     }

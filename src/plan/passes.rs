@@ -26,7 +26,7 @@ impl Plan {
     /// What the wind adds: no memory, because what a tree's sway takes is in words that its records have to spare.
     pub(super) fn list_wind(&self, scene: &Scene, items: &mut Items) {
         let Some(wind) = scene.wind else { return };
-        let mut add = |name: &str, reason: &str| items.step("data", name, reason);
+        let mut add = |name: &str, reason: &str| items.step("pipeline", name, reason);
         let shear = 100.0 * wind.shear();
         if self.z_fields {
             let from =

@@ -2,6 +2,7 @@
 
 use crate::forest::cull::CullData;
 use crate::forest::meshes::MeshData;
+use crate::forest::species::SpeciesData;
 use crate::frame::Forest;
 use crate::frame::targets::ImageTargets;
 use crate::gpu::interface::{
@@ -69,6 +70,7 @@ impl Meshes {
         &self,
         recorder: &mut Recorder,
         view: &Buffer,
+        species: &SpeciesData,
         (cull, data, range): (&CullData, &MeshData, f64),
         targets: &ImageTargets,
     ) {
@@ -76,6 +78,7 @@ impl Meshes {
             ("view", Resource::Buffer(view)),
             ("trees", Resource::Texels(&cull.trees)),
             ("lists", Resource::Buffer(&cull.lists)),
+            ("species", Resource::Buffer(&species.table)),
             ("starts", Resource::Buffer(&cull.starts)),
             ("totals", Resource::Buffer(&cull.totals)),
             ("draws", Resource::Buffer(&data.draws)),

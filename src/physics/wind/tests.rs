@@ -41,7 +41,7 @@ fn what_is_moved_stays_within_reach() {
         let s = m.sway(1.0, height, stream.bits());
         let above = p[2] + d[2] + centre;
         let moved = [d[0] + s[0] * above, d[1] + s[1] * above, d[2]];
-        let leaf = w.flutter() * LARGEST_LEAF;
+        let leaf = w.flutter() * LEAF_REACH * radius;
         let by = moved.iter().map(|v| v * v).sum::<f64>().sqrt();
         assert!(by + leaf <= w.reach(height, radius), "{by}");
     }

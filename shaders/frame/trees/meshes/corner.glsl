@@ -6,15 +6,17 @@ const float UV_STEPS = 2048.0; // a texture
 vec3 corner_place(uvec4 corner) { return uintBitsToFloat(corner.xyz); }
 vec2 corner_uv(uvec4 corner) { return vec2(corner.w & 0xffffu, corner.w >> 16u) * (1.0 / UV_STEPS); }
 
+// Middle of a leaf, from its 10 bits along each axis of the tree's box.
+vec3 leaf_middle(uint bits, vec3 box) { return (vec3(uvec3(bits, bits >> 10u, bits >> 20u) & 1023u) * (2.0 / 1023.0) - 1.0) * box; }
+
 // Where the wind moves a place of a model to, in its own axes, still from where the middle of the box is moved to: a leaf turns about its own
-// middle, and goes with the branch that holds that; all then leans with the tree. `card` is the triangle's (MeshFace), `name` the tree's in
-// the shadow maps, and `word` that of its species. All corners of a leaf move alike, so that it keeps its shape.
-vec3 blown(Motion m, uint word, uint name, uvec2 card, vec3 place) {
+// middle, and goes with the branch that holds that; all then leans with the tree. `face` is the triangle (MeshFace), `name` the tree's in
+// the shadow maps, `word` that of its species, and `box` the half extents of the tree's box. All corners of a leaf move alike, so that it keeps its shape.
+vec3 blown(Motion m, uint word, uint name, uvec4 face, vec3 box, vec3 place) {
     vec3 anchor = place;
-    if ((card.x | card.y) != 0u) {
-        anchor = vec3(unpackHalf2x16(card.x), unpackHalf2x16(card.y).x);
-        uint leaf = hash2(card.x ^ name, card.y);
-        place = anchor + turned_about(place - anchor, card_axis(card.y >> 16u), leaf_flutter(m, leaf));
+    if ((face.y & 2u) != 0u) {
+        anchor = leaf_middle(face.w, box);
+        place = anchor + turned_about(place - anchor, card_axis(face.y >> 16u), leaf_flutter(m, hash2(face.w ^ name, face.y)));
     }
     return swayed(word, place + branch_sway(m, anchor, name));
 }

@@ -10,6 +10,7 @@ layout(std430, binding = 1) readonly buffer Casters { Caster items[]; } casters;
 layout(std430, binding = 2) readonly buffer Draws { MeshDraw items[]; } draws;
 layout(binding = 4) uniform usamplerBuffer corners;
 layout(binding = 5) uniform usamplerBuffer faces;
+layout(std140, binding = 7) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
 layout(push_constant) uniform Push {
     ShadowBlock block;
     uint first_caster;
@@ -27,7 +28,7 @@ void main() {
     uvec4 corner = texelFetch(corners, int(d.first_vertex) + (is ? gl_VertexIndex : 0));
     uvec4 triangle = texelFetch(faces, int(d.first_face + (is ? face : 0u)));
     vec3 place = corner_place(corner);
-    if (WIND) place = blown(motion_of(view.v), t.species, t.dither & 255u, triangle.zw, place);
+    if (WIND) place = blown(motion_of(view.v), t.species, t.dither & 255u, triangle, species.items[species_row(t.species)].scale_to_metres, place);
     vec3 m = rotated(t.turn, place * t.scale);
     vec3 at = t.place + vec3(dot(block.x, m), dot(block.y, m), dot(block.z, m));
     uv = corner_uv(corner);
