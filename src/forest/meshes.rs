@@ -121,10 +121,11 @@ impl Content {
         let first_face = self.faces.len() as u32;
         let first_mask = self.masks.len() as u32;
         let words = 8 * envelope_words(envelopes.directions as u32) as usize;
-        let turning = if wind { turning(&surface, &envelopes.parts) } else { Vec::new() };
+        let is_leaf = |f: &Face| !any || mesh.materials[f.material as usize].foliage;
+        let turning = if wind { turning(&surface, is_leaf) } else { Vec::new() };
         for (k, face) in (0u32..).zip(&surface.faces) {
             self.corners.extend(corners(&surface, face));
-let leaf = u32::from(!any || mesh.materials[face.material as usize].foliage);
+            let leaf = u32::from(is_leaf(face));
             let [turns, middle] = turning.get(k as usize).copied().flatten().map_or([0; 2], Turning::packed);
             let mask = face.mask.map_or(NO_PAGE, |m| first_mask + m);
             self.faces.push(MeshFace { mask, foliage: leaf | turns, spare: 0, middle });

@@ -44,7 +44,7 @@ const LEAF_SPEED: f64 = 8.0;
 /// Largest angle of a leaf, rad.
 const MOST_FLUTTER: f64 = 0.6;
 /// Bound on the reach of leaves that turn, from what they turn about, over that of their tree to the sides.
-pub const LEAF_REACH: f64 = 0.12;
+pub const LEAF_REACH: f64 = 0.2;
 
 /// The wind of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]

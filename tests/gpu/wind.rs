@@ -257,6 +257,7 @@ fn a_trees_mesh_and_its_z_field_sway_alike_and_its_foot_stays() {
     // Half of the bound at the middle of the crown, six metres up.
     assert!(most > 0.25 * wind.shear() * 6.0 * metre, "{most} pixels, {metre} a metre");
     assert!(most < wind.shear() * 14.0 * metre, "{most}");
+    drop(both);
     gpu.close().unwrap();
 }
 
@@ -314,6 +315,16 @@ fn extremes_of_wind_and_time_are_drawn() {
         for time in [0.0, -1e9, 1e9, 0.5 * PERIOD] {
             at(&mut renderer, &camera, time);
         }
+        // Spheres of the cull hold the tree wherever it is moved to: its box, which is a hair wider than its places, and what the wind adds.
+        let (row, wind) = (renderer.forest().unwrap().species.rows[0], scene.wind.unwrap());
+        let [half_width, _, half_height] = row.scale_to_metres.map(f64::from);
+        let reach = wind.reach(f64::from(row.centre) + half_height, half_width);
+        let radius = half_width.hypot(half_height) + reach;
+        assert!(
+            (f64::from(row.bounding_radius) - radius).abs() < 1e-5 * radius,
+            "{} {radius}",
+            row.bounding_radius
+        );
         // Inside the crown, and under it.
         for position in [[300.0, 300.0, 9.0], [300.2, 300.0, 0.5]] {
             at(&mut renderer, &device::camera(position, [310.0, 305.0, 9.0]), 3.0);
