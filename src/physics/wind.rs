@@ -110,6 +110,8 @@ impl Wind {
     /// The wind at a time in seconds, which may be any finite number.
     pub fn at(&self, seconds: f64) -> Motion {
         let (toward, shear) = (self.toward(), self.shear());
+        // Beyond, doubles tell no parts of a second apart, and what follows might be no number.
+        let seconds = seconds.clamp(-1e15, 1e15);
         // Each wave is as long along the wind as its vector's part there says.
         let passed = |k: usize| WAVES[k][1].to_radians().cos() / WAVES[k][0] * self.speed * seconds;
         let part = (seconds / PERIOD).rem_euclid(1.0);

@@ -237,7 +237,7 @@ fn a_trees_mesh_and_its_z_field_sway_alike_and_its_foot_stays() {
     let swaying = scene(&[[300.0, 300.0]], 0.0, Some(wind));
     let rest = [NEAR, TREES].map(|by| at(&mut renderer(&gpu, &still, &camera, by, None), &camera, 0.0));
     let mut both = [NEAR, TREES].map(|by| renderer(&gpu, &swaying, &camera, by, None));
-    let (mut most, mut sums): (f64, [f64; 2]) = (0.0, [0.0; 2]);
+    let mut most: f64 = 0.0;
     let all = 0..SIZE[1];
     for k in 0..16 {
         let time = 4.0 * f64::from(k);
@@ -247,7 +247,6 @@ fn a_trees_mesh_and_its_z_field_sway_alike_and_its_foot_stays() {
         most = most.max(moved[1].abs());
         // Branches of a mesh swing by up to a tenth of their length besides, the left ones as the right ones; a pixel is half a metre.
         assert!((moved[0] - moved[1]).abs() < 0.25, "{time}: {moved:?}");
-        (0..2).for_each(|k| sums[k] += moved[k] / 16.0);
         // The lowest metre of the trunk: a tenth of half a metre is an eighth of a pixel.
         let foot = |p: &Picture| middle(p, 57..60)[0];
         let feet = [0, 1].map(|k| foot(&pictures[k]) - foot(&rest[k]));
@@ -269,12 +268,10 @@ fn shadows_of_meshes_and_of_z_fields_move_along() {
     let camera = device::camera([309.0, 314.0, 22.0], [309.0, 314.5, 0.0]);
     for by in [NEAR, TREES] {
         let mut renderer = renderer(&gpu, &scene, &camera, by, None);
-        let mut casters = 0;
         let mut lit = |time: f64| -> Vec<f32> {
             let picture = at(&mut renderer, &camera, time);
             let report = renderer.render(&camera, 1.0).unwrap();
             assert_eq!(report.trees.cascades.iter().sum::<u32>(), 0, "{by}: of the same time maps are kept");
-            casters += 1;
             let l = linear(&picture);
             let bare = |k: &usize| l.coverage[*k] == 0.0;
             (0..l.coverage.len()).map(|k| if bare(&k) { l.fractions[k][0] } else { -1.0 }).collect()

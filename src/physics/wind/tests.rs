@@ -122,6 +122,8 @@ fn gusts_travel_with_the_wind_and_time_is_exact_however_late() {
         let step = w.at(late + 1e-3).flutter(77) - a.flutter(77);
         assert!(step.abs() < 0.6 * TAU * 6.0 * 1.1e-3, "{late}: {step}");
     }
+    let end = w.at(f64::MAX);
+    assert!(end.waves.iter().all(|v| (0.0..=1.0).contains(v)));
     let phases = w.place_phases(x);
     for (k, p) in now.phases_at(x).into_iter().enumerate() {
         let packed = f64::from(phases >> (10 * k) & 1023) / 1024.0;
