@@ -25,6 +25,7 @@ const uint SIGHT_TEXELS = 8u;         // 16-byte words of a tree's record for fi
 const uint MESH_TREES = 4096u;        // most trees in view that are meshes: 12 bits of what a sample sees
 const uint MESH_TRIANGLES = 524288u;  // most triangles of a mesh: 19 bits of it
 const uint HIDING_STEPS = 16u;        // steps of height above the ground for which what trees hide of the sky is known
+const uint TREE_SPECIES = 15u;        // of a tree's word of species: its index; the rest is its sway in the wind (physics/wind.glsl), in its own axes
 const uint MESH_SEEN = 0x80000000u;   // of what a sample sees: a mesh's tree << 19 | triangle, not a quad of the ground
 const uint COVER_SCRATCH = 16u;       // coverage tiles of one scratch word a texel that the scratch buffer holds
 const float FADE_FIRST = 0.9;         // part of its range at which the first of a species' trees has faded out
@@ -64,6 +65,10 @@ struct View {
     float silhouette_step;            // first distance from a tree at which its sight line is compared with the ground, m
     float height_cell;                // metres a texel of the height map
     float cells_per_metre;            // 1 / height_cell
+    vec4 wind;                        // xy: unit vector to where it blows; amplitudes of the shear: z by gusts, w of a tree's own
+    vec4 wind_waves;                  // xyz: phases of the gusts' waves at the world's origin, turns; w: amplitude of leaves, rad
+    vec4 wind_here;                   // xyz: the same at the camera; w: amplitude of branches
+    uint wind_clock;                  // part of the wind's period that has passed, 2^-32
 };
 
 // One species. Bound as a uniform block: without arrays, and with a vec3 in it, std140 and std430 agree.
@@ -129,6 +134,7 @@ struct SeedQuad {
     uint region;                      // its region in the seed buffer
     uint first_position;              // its listed trees
     uint position_count;              // and their number
+    uint wind_phases;                 // that gusts have at its corner, of 1/1024 turn, ten bits a wave; 0 without wind
 };
 
 // A listed tree, binned to its quad.
@@ -165,7 +171,7 @@ struct Tree {
     vec3 centre;                      // of its box, from the camera, m
     float scale;                      // of the model
     vec2 turn;                        // cosine and sine of its rotation
-    uint species;                     // index
+    uint species;                     // index; sway in the wind << 4
     uint identity;                    // hash
     uint view_layers;                 // three z-field views nearest the view direction, 10 bits each; bit 31: from below
     uint light_layers;                // the same for the light direction
@@ -214,6 +220,7 @@ struct CasterQuad {
     uint region;                      // its region in the seed buffer
     uint block;                       // index
     uint base;                        // first record of the block
+    uint wind_phases;                 // as in SeedQuad
 };
 
 // A draw of a species' mesh, without indices, and where its trees and triangles are.
@@ -242,8 +249,9 @@ struct MeshLightParameters {
 // A triangle of a mesh.
 struct MeshFace {
     uint mask;                        // layer of the array of masks; NO_PAGE: no holes
-    uint foliage;                     // 1: a leaf; 0: bark
-    uvec2 spare;                      // a texel has four words
+    uint foliage;                     // bit 0: a leaf, else bark; bit 1: it turns in the wind, about an axis of two bytes << 16
+    uint spare;                       // a texel has four words
+    uint middle;                      // of a leaf that turns, in the tree's box, 10 bits an axis
 };
 
 // A tree that casts.
@@ -251,7 +259,7 @@ struct Caster {
     vec3 place;                       // of its box's centre in the block
     float scale;                      // of the model
     vec2 turn;                        // cosine and sine of its rotation
-    uint species;                     // index
+    uint species;                     // index; sway in the wind << 4
     uint light_layers;                // three z-field views nearest the light direction, 10 bits each
     vec2 light_weights;               // of the first two views
     float mip;                        // of the views

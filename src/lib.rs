@@ -46,6 +46,7 @@
 //! | BN12 §7, trees on silhouettes beyond the hand-over | [`land::silhouette`] | `land/silhouette.glsl` | `tests/gpu/silhouettes.rs` |
 //! | BN12 §8, sub-pixel masks | [`physics::masks`] | `physics/masks.glsl` | `measure/conform/law.rs`, `tests/conform.rs` |
 //! | BN12 §8, many layers of trees: seen first, lit once | [`frame::trees::tiles`], [`frame::seen_ground`] | `frame/trees/tiles/*`, `frame/ground*.comp` | `tests/gpu/tiles.rs`, `measure/conform/tiles.rs` |
+//! | wind: sway, flutter, gusts (Boulanger et al. 2008, section 7) | [`physics::wind`] | `physics/wind.glsl`, `forest/sway.glsl`, `frame/trees/meshes/corner.glsl` | `tests/gpu/wind.rs` |
 //! | Monte-Carlo reference (Kajiya 1986), error of every pixel | [`mod@reference`] | | `tests/reference.rs` |
 //! | parallel-split shadow maps (Zhang et al. 2006) | [`camera::cascades`], [`frame::shadows`] | `frame/trees/zfield_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |
 //! | trees that need no file (Weber and Penn 1995) | [`tree`] | | `tests/trees.rs` |

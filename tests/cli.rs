@@ -88,6 +88,8 @@ fn wrong_usage_is_2_and_says_what_to_do() {
         (&["render", "-o", "a.jpg"], "*.png"),
         (&["render", "--exr", "a.png"], "*.exr"),
         (&["render", "--exposure", "lots"], "-64 to 64"),
+        (&["render", "--time", "soon"], "write seconds"),
+        (&["bench", "--time", "inf"], "write seconds"),
         (&["render", "--capture-frame", "3", "--frames", "2"], "--capture-frame 3"),
         (&["render", "--capture-frame", "1"], "RenderDoc"),
         (&["conform", "--shard", "3/2"], "2/8"),

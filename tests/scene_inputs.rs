@@ -140,6 +140,15 @@ fn wrong_scenes_name_line_key_and_remedy() {
             "line 13, key `species[0].leaf_transmittance`",
         ),
         (species("density = 0.1\nfoliage = [\"leef\"]"), "\"leaf\"?"),
+        (with("[wind]\nspeed = 8.0\nazimuth = 90.0"), "`gustiness` is missing"),
+        (
+            with("[wind]\nspeed = -1.0\nazimuth = 90.0\ngustiness = 0.5"),
+            "key `wind.speed`: -1 is outside 0 to 100 m/s",
+        ),
+        (with("[wind]\nspeed = 8.0\nazimuth = 361.0\ngustiness = 0.5"), "key `wind.azimuth`"),
+        (with("[wind]\nspeed = 8.0\nazimuth = 90.0\ngustiness = 1.5"), "key `wind.gustiness`"),
+        (with("[wind]\nspeed = nan\nazimuth = 90.0\ngustiness = 0.5"), "key `wind.speed`"),
+        (with("[wind]\nspeed = 8.0\nazimuth = 90.0\ngustyness = 0.5"), "did you mean `gustiness`?"),
         (species("density = 0.1\nfoliage = [3]"), "line 12, key `species[0].foliage[0]`"),
         (species("density = 0.1\nextinction = -1"), "line 12, key `species[0].extinction`"),
         (species("density = 0.1").replace("builtin:oak", "builtin:aok"), "\"builtin:oak\"?"),
@@ -164,6 +173,12 @@ fn settings_and_lights_arrive() {
         (128, -5.5, [2.0; 3])
     );
     assert!(matches!(scene.sky, Sky::Uniform([1.0, 2.0, 3.0])));
+    assert!(scene.wind.is_none());
+    let wind = |speed: &str| {
+        let text = format!("{PLAIN}[wind]\nspeed = {speed}\nazimuth = -90\ngustiness = 0.25");
+        parse(&text).unwrap().wind.map(|w| [w.speed, w.azimuth, w.gustiness])
+    };
+    assert_eq!((wind("8"), wind("0"), wind("0.0")), (Some([8.0, -90.0, 0.25]), None, None));
 }
 
 #[test]

@@ -5,6 +5,8 @@
 #include "interface.glsl"
 #include "physics/hash.glsl"
 #include "physics/views.glsl"
+#include "forest/wind.glsl"
+#include "forest/sway.glsl"
 #include "forest/casters.glsl"
 
 layout(local_size_x = 256) in;
@@ -34,7 +36,7 @@ bool any_drawn(ShadowBlock b, ivec4 pages) {
                sums.items[south + pages.x] > 0u;
 }
 
-Caster make_caster(ShadowBlock b, Seed s, vec3 place, Species kind) {
+Caster make_caster(ShadowBlock b, uint phases, Seed s, vec3 place, Species kind) {
     Caster t;
     t.place = place;
     t.scale = s.scale;
@@ -44,7 +46,15 @@ Caster make_caster(ShadowBlock b, Seed s, vec3 place, Species kind) {
     mat3 back = mat3(t.turn.x, -t.turn.y, 0.0, t.turn.y, t.turn.x, 0.0, 0.0, 0.0, 1.0);
     uvec3 layers;
     vec3 weights;
-    view_lookup((back * view.v.sun_direction) / kind.scale_to_metres, VIEW_RINGS, layers, weights);
+    vec3 toward = back * view.v.sun_direction;
+    if (WIND) {
+        uint sway = seed_sway(view.v, phases, s, kind, t.turn);
+        vec3 moved = vec3(unpack_sway(sway) * (kind.centre * s.scale), 0.0) * back;
+        t.place += vec3(dot(b.x, moved), dot(b.y, moved), dot(b.z, moved));
+        t.species |= sway;
+        toward = unswayed(sway, toward);
+    }
+    view_lookup(toward / kind.scale_to_metres, VIEW_RINGS, layers, weights);
     t.light_layers = layers.x | layers.y << 10u | layers.z << 20u;
     t.light_weights = weights.xy;
     float width = 2.0 * max(kind.scale_to_metres.x, kind.scale_to_metres.z) * s.scale;
@@ -85,5 +95,5 @@ void main() {
         first_record = q.base + atomicAdd(commands.items[p.first_command + q.block].index_count, 6u * count) / 6u;
     }
     barrier();
-    if (casts) casters.items[first_record + rank] = make_caster(b, s, place, kind);
+    if (casts) casters.items[first_record + rank] = make_caster(b, q.wind_phases, s, place, kind);
 }

@@ -13,6 +13,8 @@
 #include "physics/shadow.glsl"
 #include "physics/masks.glsl"
 #include "physics/indirect.glsl"
+#include "forest/wind.glsl"
+#include "forest/sway.glsl"
 #include "forest/cull.glsl"
 #include "forest/members.glsl"
 
@@ -99,9 +101,20 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     float distance = max(length(centre), 1e-6);
     vec3 to_camera = -centre / distance;
     vec2 weights;
-    t.view_layers = lookup((back * to_camera) / kind.scale_to_metres, weights);
+    uint sway = 0u;
+    vec3 viewer = back * to_camera, eye = back * -centre, toward = back * v.sun_direction;
+    if (WIND) {
+        // The tree sways, and its middle with it; to the views around, it stands still.
+        sway = seed_sway(v, q.wind_phases, s, kind, t.turn);
+        vec2 moved = unpack_sway(sway) * (kind.centre * s.scale);
+        t.centre.xy += vec2(t.turn.x * moved.x - t.turn.y * moved.y, t.turn.y * moved.x + t.turn.x * moved.y);
+        eye = unswayed(sway, back * -t.centre);
+        viewer = eye;
+        toward = unswayed(sway, toward);
+    }
+    t.view_layers = lookup(viewer / kind.scale_to_metres, weights);
     t.view_weights = weights;
-    t.light_layers = lookup((back * v.sun_direction) / kind.scale_to_metres, weights);
+    t.light_layers = lookup(toward / kind.scale_to_metres, weights);
     t.light_weights = weights;
     // One integer mip a tree: texels of 0.35 to 0.7 pixels on the wider side of the box, because bilinear filters are two
     // texels wide. A level coarser blurs neighbouring crowns into each other's gaps, and more ground shows than should.
@@ -110,7 +123,7 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     t.mip = clamp(floor(log2(max(texels_per_pixel, 1e-6)) - 0.5), 0.0, log2(VIEW_RESOLUTION));
     // Trees end smoothly at their range (BN12, section 7), and where the camera enters the crown.
     float relative = distance / kind.range;
-    vec3 eye = (back * -centre) / (kind.scale_to_metres * s.scale);
+    eye = eye / (kind.scale_to_metres * s.scale);
     float inside = max(length(eye.xy), abs(eye.z));
     t.fade = range_fade(q, s, centre, kind, relative) * smoothstep(1.05, 1.35, inside);
     vec3 ground = ground_of(s);
@@ -141,13 +154,14 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     float mesh = mesh_range > 0.0 ? tree_fade(distance / mesh_range, unit(hash(s.identity ^ HASH_FADE))) : 0.0;
     uint samples = covered_samples(mesh, unit(hash(s.identity ^ HASH_MESH)), SAMPLES);
     t.cascade_tint = cascade_at(v.cascade_far, v.cascade_count, distance) | samples << 8u | packHalf2x16(vec2(0.0, tint));
+    t.species |= sway;
     return t;
 }
 
 // Light that met more than one surface, of a tree among others of thickness x.
 HandedLight handed_on(Tree t, Species kind, vec3 ground, float x) {
     vec3 l = view.v.sun_direction, to_camera = -normalize(t.centre);
-    int base = INDIRECT_FIRST + int(t.species) * INDIRECT_NODES * INDIRECT_NODE;
+    int base = INDIRECT_FIRST + int(t.species & TREE_SPECIES) * INDIRECT_NODES * INDIRECT_NODE;
     IndirectAt at = indirect_at(x, texelFetch(indirect, 0).w, INDIRECT_NODES);
     Handed sun = indirect_near_sun(indirect, base, at, to_camera.z, l.z, dot(to_camera, l)), sky = indirect_near_sky(indirect, base, at, to_camera.z);
     float tint = unpackHalf2x16(t.cascade_tint).y;

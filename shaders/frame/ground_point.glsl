@@ -4,6 +4,7 @@ layout(binding = 3) uniform sampler2DArray slope_tiles;
 layout(push_constant) uniform Push { TerrainParameters p; };
 
 #include "forest/expected.glsl"
+#include "forest/wind.glsl"
 #include "frame/cover.glsl"
 #include "physics/lift.glsl"
 
@@ -33,6 +34,12 @@ Cover cover_under(GroundPoint from, vec3 ray, vec3 n, float low, float high, boo
     vec2 middle = lifted(ray, n, 0.5 * (low + high)), way = lifted(ray, n, 0.5 * (high - low));
     float span = 2.0 * from.cover.scale * length(way);
     uint count = lift_count(span * float(COVER_SIDE) / cover_texel(from.cover));
+    if (WIND) {
+        // Crowns that gusts have moved to where the ray is stand as much behind.
+        vec2 sway = view.v.wind.z * gusts_at(view.v.wind.xy, view.v.wind_here.xyz, from.position.xy) * view.v.wind.xy;
+        middle -= 0.5 * (low + high) * sway;
+        way -= 0.5 * (high - low) * sway;
+    }
     // Of the rest, the mean: no texel finer than a part of the way.
     from.cover = coarsened(from.cover, span / float(count));
     Cover c;

@@ -22,6 +22,7 @@ const uint HASH_FADE = 0x846ca68bu;
 const uint HASH_MESH = 0x3c6ef372u;
 const uint HASH_THIN = 0x68e31da4u;
 const uint HASH_SPECIES = 0xb5297a4du;
+const uint HASH_SWAY = 0x9e6c63d1u;
 
 // Name of a tree in the shadow maps, of 8 bits.
 uint caster_name(uint identity) { return hash(identity ^ HASH_DITHER) & 255u; }

@@ -117,17 +117,7 @@ impl Parts {
 fn leaves(mesh: &Mesh, surface: &Surface) -> (Vec<Option<u32>>, usize) {
     let any = surface.faces.iter().any(|f| mesh.materials[f.material as usize].foliage);
     let is_leaf = |f: &Face| !any || mesh.materials[f.material as usize].foliage;
-    // Each corner's faces lead to one of them, the root.
-    let mut parent: Vec<u32> = (0..surface.faces.len() as u32).collect();
-    let mut at_corner = std::collections::HashMap::new();
-    for (k, face) in surface.faces.iter().enumerate().filter(|(_, f)| is_leaf(f)) {
-        for p in face.p {
-            let first = *at_corner.entry(p.to_array().map(f32::to_bits)).or_insert(k as u32);
-            let (a, b) = (root(&mut parent, first), root(&mut parent, k as u32));
-            parent[a.max(b) as usize] = a.min(b);
-        }
-    }
-    let roots: Vec<u32> = (0..parent.len() as u32).map(|k| root(&mut parent, k)).collect();
+    let roots = joined(surface, is_leaf);
     let mut bounds = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); roots.len()];
     for (face, root) in surface.faces.iter().zip(&roots) {
         let b = &mut bounds[*root as usize];
@@ -149,6 +139,21 @@ fn leaves(mesh: &Mesh, surface: &Surface) -> (Vec<Option<u32>>, usize) {
     });
     let leaf_of = leaf_of.collect();
     (leaf_of, count as usize)
+}
+
+/// Of every face the one that stands for all that it hangs together with: those that are leaves and share a corner. Of others it is the face itself.
+pub(super) fn joined(surface: &Surface, is_leaf: impl Fn(&Face) -> bool) -> Vec<u32> {
+    // Each corner's faces lead to one of them, the root.
+    let mut parent: Vec<u32> = (0..surface.faces.len() as u32).collect();
+    let mut at_corner = std::collections::HashMap::new();
+    for (k, face) in surface.faces.iter().enumerate().filter(|(_, f)| is_leaf(f)) {
+        for p in face.p {
+            let first = *at_corner.entry(p.to_array().map(f32::to_bits)).or_insert(k as u32);
+            let (a, b) = (root(&mut parent, first), root(&mut parent, k as u32));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    (0..parent.len() as u32).map(|k| root(&mut parent, k)).collect()
 }
 
 /// The face that stands for all that a face hangs together with.

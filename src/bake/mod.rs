@@ -18,6 +18,7 @@ mod self_shadow;
 pub(crate) mod surface;
 pub mod tables;
 mod transfer;
+pub(crate) mod turning;
 mod verify;
 mod views;
 

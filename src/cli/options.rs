@@ -12,6 +12,9 @@ use canopy::settings::{KNOBS, PRESETS, Settings};
 use canopy::{Error, Result};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
+/// Largest time of a scene, s.
+const MOST_SECONDS: f64 = 1e9;
+
 /// Which scene, from where, how large and how well.
 #[derive(clap::Args)]
 pub struct SceneOptions {
@@ -26,6 +29,9 @@ pub struct SceneOptions {
     /// Seed of everything random, instead of the scene's
     #[arg(long, value_name = "N")]
     pub seed: Option<u32>,
+    /// Time of the scene, which moves what its [wind] does; along a camera path, that at which the path begins
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true, value_parser = seconds)]
+    pub time: f64,
     #[command(flatten)]
     pub quality: QualityOptions,
 }
@@ -38,6 +44,7 @@ impl SceneOptions {
         if let Some(seed) = self.seed {
             scene.seed = seed;
         }
+        scene.time = self.time;
         let camera = scene.camera(self.camera.as_deref())?.clone();
         Ok((scene, camera))
     }
@@ -317,6 +324,14 @@ pub fn time(text: &str) -> std::result::Result<Duration, String> {
     };
     let number: f64 = digits.trim().parse().map_err(|_| form())?;
     Duration::try_from_secs_f64(number * unit).map_err(|_| form())
+}
+
+/// A time of a scene, s.
+pub fn seconds(text: &str) -> std::result::Result<f64, String> {
+    match text.parse() {
+        Ok(time) if (-MOST_SECONDS..=MOST_SECONDS).contains(&time) => Ok(time),
+        _ => Err(format!("write seconds, from -{MOST_SECONDS} to {MOST_SECONDS}")),
+    }
 }
 
 /// Every knob, for `--help`.

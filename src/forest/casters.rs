@@ -115,6 +115,7 @@ impl CasterData {
         let constants = [
             ("VIEW_RINGS", scene.settings.view_rings),
             ("VIEW_RESOLUTION", (scene.settings.view_resolution as f32).to_bits()),
+            ("WIND", u32::from(plan.wind)),
         ];
         Ok(CasterData {
             casters: gpu.described_buffer(&plan.buffer(resource::CASTERS))?,
@@ -171,7 +172,8 @@ impl CasterData {
             filling.records += records;
             for block in into {
                 let caster = caster_quad(seeds, &cascades[blocks[block].cascade], &blocks[block], [x, y]);
-                let caster = CasterQuad { region: quad.region, block: block as u32, ..caster };
+                let (region, wind_phases) = (quad.region, quad.wind_phases);
+                let caster = CasterQuad { region, block: block as u32, wind_phases, ..caster };
                 filling.quads.entry(block).or_default().push(caster);
             }
         }

@@ -83,6 +83,7 @@ impl CullData {
             ("INDIRECT", u32::from(plan.indirect > 0)),
             ("INDIRECT_FIRST", IndirectData::first_species(plan)),
             ("INDIRECT_NODES", plan.indirect.max(2)),
+            ("WIND", u32::from(plan.wind)),
         ];
         Ok(CullData {
             trees: gpu.described_buffer(&plan.buffer(resource::TREES))?,

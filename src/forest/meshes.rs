@@ -6,6 +6,7 @@ use half::f16;
 use crate::bake::envelope::Envelopes;
 use crate::bake::hiding::{self, HEIGHTS};
 use crate::bake::surface::{Face, Mask, Surface};
+use crate::bake::turning::{Turning, turning};
 use crate::bake::{Baked, SpeciesBake};
 use crate::forest::species::mean_squared_scale;
 use crate::gpu::interface::{HIDING_STEPS, MAX_SPECIES, MESH_TRIANGLES, MeshDraw, MeshFace, NO_PAGE};
@@ -77,7 +78,7 @@ impl MeshData {
                         "a species was baked without the crown around its leaves that the plan lists".into(),
                     )
                 })?;
-            all.add(species, envelopes)?;
+            all.add(species, envelopes, plan.wind)?;
         }
         let (pairs, top) = hiding_pairs(scene, baked, rule.len());
         let texels = |name, bytes: &[u8]| -> Result<Buffer> {
@@ -105,7 +106,7 @@ impl MeshData {
 }
 
 impl Content {
-    fn add(&mut self, species: &Species, envelopes: &Envelopes) -> Result<()> {
+    fn add(&mut self, species: &Species, envelopes: &Envelopes, wind: bool) -> Result<()> {
         let mesh = &species.mesh;
         let surface = Surface::new(mesh)?;
         if surface.faces.len() > MESH_TRIANGLES as usize {
@@ -120,13 +121,14 @@ impl Content {
         let first_face = self.faces.len() as u32;
         let first_mask = self.masks.len() as u32;
         let words = 8 * envelope_words(envelopes.directions as u32) as usize;
+        let is_leaf = |f: &Face| !any || mesh.materials[f.material as usize].foliage;
+        let turning = if wind { turning(&surface, is_leaf) } else { Vec::new() };
         for (k, face) in (0u32..).zip(&surface.faces) {
             self.corners.extend(corners(&surface, face));
-            self.faces.push(MeshFace {
-                mask: face.mask.map_or(NO_PAGE, |m| first_mask + m),
-                foliage: u32::from(!any || mesh.materials[face.material as usize].foliage),
-                spare: [0; 2],
-            });
+            let leaf = u32::from(is_leaf(face));
+            let [turns, middle] = turning.get(k as usize).copied().flatten().map_or([0; 2], Turning::packed);
+            let mask = face.mask.map_or(NO_PAGE, |m| first_mask + m);
+            self.faces.push(MeshFace { mask, foliage: leaf | turns, spare: 0, middle });
             for around in envelopes.of(k) {
                 let halves = around.iter().map(|t| f16::from_f64(*t));
                 self.envelopes.extend(halves.chain(std::iter::repeat(f16::ZERO)).take(words));

@@ -10,6 +10,7 @@ use crate::land::density::density_map_size;
 use crate::land::listed::{ListedRanges, bin_listed};
 use crate::land::quadtree::Quadtree;
 use crate::land::silhouette::{Belt, Ground, silhouette_quads};
+use crate::physics::wind::Wind;
 use crate::plan::names::{pass, resource};
 use crate::plan::{Plan, QUAD_INDEX_BYTES};
 use crate::scene::{Scene, Species};
@@ -39,6 +40,7 @@ pub struct SeedData {
     pub(super) quad_count: [i32; 2],
     /// Side of a quad, m.
     pub(super) side: f64,
+    wind: Option<Wind>,
     listed_ranges: ListedRanges,
     cache: SlotCache<(i32, i32)>,
     /// Regions that the camera leaves to quads that only cast.
@@ -106,6 +108,7 @@ impl SeedData {
             },
             quad_count: scene.terrain.extent.map(|e| (e / plan.quad_side).ceil().max(1.0) as i32),
             side: plan.quad_side,
+            wind: scene.wind,
             top: plan.tallest,
         })
     }
@@ -278,6 +281,7 @@ impl SeedData {
             region,
             first_position: first,
             position_count: count,
+            wind_phases: self.wind.map_or(0, |w| w.place_phases(corner)),
             ..bytemuck::Zeroable::zeroed()
         }
     }

@@ -5,6 +5,7 @@ use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Resource, Sampler, vk};
 use crate::land::density::{DensityMap, HEIGHT_SOFTNESS, SLOPE_SOFTNESS, density_map};
 use crate::physics::correction::Correction;
+use crate::physics::crown::Frame;
 use crate::physics::forest;
 use crate::physics::masks::combination_table;
 use crate::physics::outline;
@@ -132,6 +133,13 @@ impl SpeciesData {
             ("transfer_2", Resource::Texture(&self.transfer[1], Sampler::Linear)),
         ]
     }
+}
+
+/// Radius of a sphere about the middle of a tree's box that holds the tree, however the wind moves it, m.
+fn bounding_radius(scene: &Scene, frame: &Frame) -> f32 {
+    let still = frame.half_width.hypot(frame.half_height);
+    let height = f64::from(frame.centre + frame.half_height);
+    still + scene.wind.map_or(0.0, |w| w.reach(height, f64::from(frame.half_width)) as f32)
 }
 
 /// The rows as a uniform block, which has its whole size.
@@ -270,7 +278,7 @@ fn rows(
             mesh_range: if plan.meshes { plan.mesh_range[k] as f32 } else { 0.0 },
             range: plan.species_range[k] as f32,
             crown_radius: crown.radius,
-            bounding_radius: crown.frame.half_width.hypot(crown.frame.half_height),
+            bounding_radius: bounding_radius(scene, &crown.frame),
             first_layer: k as u32 * view_count,
             scale_range: species.scale,
             max_density,

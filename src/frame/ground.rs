@@ -77,6 +77,7 @@ impl Ground {
                 ("SHADOWED", u32::from(shadowed)),
                 ("INDIRECT", u32::from(plan.indirect > 0)),
                 ("INDIRECT_NODES", plan.indirect.max(2)),
+                ("WIND", u32::from(plan.wind)),
             ];
             if plan.view_mode != ViewMode::Radiance {
                 constants.push(("VIEW_MODE", plan.view_mode as u32));

@@ -41,6 +41,7 @@ impl Horizon {
             ("COVER_SIDE", plan.coverage_size),
             ("SAMPLES", plan.samples),
             ("SKY_DRAWN", u32::from(image)),
+            ("WIND", u32::from(plan.wind)),
         ];
         let tiles = plan.size.map(|n| n.div_ceil(TILE_SIDE));
         Ok(Some(Horizon { program: gpu.compute(shader, &constants)?, tiles, clears: !image }))

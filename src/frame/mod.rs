@@ -48,6 +48,7 @@ pub struct Renderer {
     scene: Arc<Scene>,
     plan: Plan,
     light: Light,
+    time: f64,
     world: World,
     canvas: Canvas,
 }
@@ -67,6 +68,7 @@ impl Renderer {
             world,
             ring: Ring::default(),
             light: Light::new(&scene),
+            time: scene.time,
             gpu: gpu.clone(),
             scene,
             plan,
@@ -119,8 +121,8 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::render`], but for what is only found out while drawing: [`Renderer::finish`] says that.
     pub fn submit(&mut self, eye: &Eye, cascades: &[Cascade], exposure: f64) -> Result<Ticket> {
-        let light = self.light;
-        let sent = self.record(Moment { eye, cascades, light: &light, exposure });
+        let (light, time) = (self.light, self.time);
+        let sent = self.record(Moment { eye, cascades, light: &light, exposure, time });
         sent.inspect_err(|_| self.world.forget())
     }
 
@@ -208,6 +210,11 @@ impl Renderer {
         Arc::make_mut(&mut self.scene).sun = sun;
         self.light = Light::new(&self.scene);
         Ok(())
+    }
+
+    /// Draws the scene as it is at a time from now on, s: any finite number. Only what the wind moves changes with it.
+    pub fn set_time(&mut self, seconds: f64) {
+        self.time = if seconds.is_finite() { seconds } else { 0.0 };
     }
 
     /// The scene that is drawn.

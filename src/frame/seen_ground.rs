@@ -58,6 +58,7 @@ impl SeenGround {
                     ("SHADOWED", u32::from(plan.cascades > 0)),
                     ("INDIRECT", u32::from(plan.indirect > 0)),
                     ("INDIRECT_NODES", plan.indirect.max(2)),
+                    ("WIND", u32::from(plan.wind)),
                     ("VIEW_MODE", plan.view_mode as u32),
                 ],
             )?,

@@ -18,6 +18,7 @@ use crate::gpu::{
     RenderPass, Resource, Sampler, Targets, shaders, vk,
 };
 use crate::land::quadtree::Quadtree;
+use crate::physics::wind::Motion;
 use crate::plan::Plan;
 use crate::plan::names::{pass, resource};
 use crate::scene::Scene;
@@ -58,6 +59,8 @@ pub struct Shadows {
     /// Indices of a square's mesh.
     indices: Buffer,
     programs: Programs,
+    /// The wind of what is held.
+    motion: Option<Motion>,
     /// Side of leaves, m: where a cascade tells them apart meshes cast into it.
     leaf_side: f64,
 }
@@ -105,7 +108,9 @@ impl Shadows {
             gpu.graphics(&GraphicsDesc { vert, frag, colors: &[], samples: 1, depth, constants })
         };
         let s = &scene.settings;
-        let views = [("VIEW_RINGS", s.view_rings), ("VIEW_RESOLUTION", (s.view_resolution as f32).to_bits())];
+        let wind = ("WIND", u32::from(plan.wind));
+        let resolution = (s.view_resolution as f32).to_bits();
+        let views = [("VIEW_RINGS", s.view_rings), ("VIEW_RESOLUTION", resolution), wind];
         let chosen = gpu.info().vertex_layers;
         let (ground, trees, meshes) = match chosen {
             true => (
@@ -124,8 +129,8 @@ impl Shadows {
             .then(|| program(ground, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[]));
         let trees =
             (on && plan.z_fields).then(|| program(trees, &shaders::FRAME_TREES_ZFIELD_SHADOW_FRAG, &views));
-        let meshes =
-            (on && plan.meshes).then(|| program(meshes, &shaders::FRAME_TREES_MESHES_SHADOW_FRAG, &[]));
+        let meshes = (on && plan.meshes)
+            .then(|| program(meshes, &shaders::FRAME_TREES_MESHES_SHADOW_FRAG, &views[2..]));
         let side = SHADOW_CELLS + 1;
         let cells = (0..SHADOW_CELLS * SHADOW_CELLS).map(|k| k % SHADOW_CELLS + side * (k / SHADOW_CELLS));
         let indices: Vec<u32> =
@@ -148,6 +153,7 @@ impl Shadows {
                 trees: trees.transpose()?,
                 meshes: meshes.transpose()?,
             },
+            motion: None,
             leaf_side: plan.leaf_side,
         })
     }
@@ -215,6 +221,14 @@ impl Shadows {
         Ok(())
     }
 
+    /// Takes the wind of a moment: where what casts has moved, all is drawn anew.
+    pub fn moved(&mut self, motion: Option<Motion>) {
+        if self.motion != motion {
+            self.motion = motion;
+            self.forget();
+        }
+    }
+
     /// What was to be drawn may not have been: all is drawn anew.
     pub fn forget(&mut self) {
         self.held = Held::default();
@@ -253,7 +267,7 @@ impl Shadows {
                         self.draw_trees(pass, program, view, (work, *layers), t, batch);
                     }
                     if let (Some(program), Some(t)) = (&self.programs.meshes, trees) {
-                        self.draw_meshes(pass, program, (work, *layers), t, batch);
+                        self.draw_meshes(pass, program, view, (work, *layers), t, batch);
                     }
                 });
             }
@@ -333,6 +347,7 @@ impl Shadows {
         &self,
         pass: &mut RenderPass,
         program: &Program,
+        view: &Buffer,
         (work, layers): (&ShadowWork, Layers),
         trees: CastingTrees,
         batch: usize,
@@ -347,10 +362,12 @@ impl Shadows {
         pass.bind(
             program,
             &[
+                ("view", Resource::Buffer(view)),
                 ("casters", Resource::Buffer(&trees.data.casters)),
                 ("draws", Resource::Buffer(&meshes.draws)),
                 ("corners", Resource::Texels(&meshes.corners)),
                 ("faces", Resource::Texels(&meshes.faces)),
+                ("species", Resource::Buffer(&trees.species.table)),
                 ("masks", Resource::Texture(&meshes.masks, Sampler::LinearRepeat)),
             ],
         );

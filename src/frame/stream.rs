@@ -25,6 +25,8 @@ pub struct Moment<'a> {
     pub light: &'a Light,
     /// Exposure of the display picture.
     pub exposure: f64,
+    /// Time of the scene, s.
+    pub time: f64,
 }
 
 /// What a frame draws, and what it has to produce before.
@@ -54,12 +56,14 @@ impl World {
         (scene, plan): (&Scene, &Plan),
         moment: Moment,
     ) -> Result<Streamed> {
-        let Moment { eye, cascades, light, .. } = moment;
+        let Moment { eye, cascades, light, time, .. } = moment;
         self.can_show(scene, plan, eye)?;
         let before = self.evicted();
         let pixels = f64::from(scene.settings.terrain_pixels);
         let mut draws = self.terrain.update(eye, cascades.last().map_or(-1.0, |c| c.far), pixels)?;
         let tree = &self.terrain.tree;
+        let motion = scene.wind.filter(|_| plan.wind).map(|w| w.at(time));
+        self.shadows.moved(motion);
         self.shadows.update(recorder, (scene, plan), tree, eye, cascades)?;
         let mut trees = None;
         if let Some(forest) = &mut self.forest {
@@ -72,7 +76,7 @@ impl World {
         }
         self.terrain.upload(recorder, &draws)?;
         let seeds = self.forest.as_ref().map(|f| &f.seeds);
-        let view = view(scene, plan, eye, light, cascades, seeds, self.terrain.tree.step());
+        let view = view(scene, plan, eye, (light, motion), cascades, seeds, self.terrain.tree.step());
         recorder.upload(&self.view, 0, &[view])?;
         let produced = Tiles {
             terrain: draws.fresh.1,

@@ -5,6 +5,7 @@ use crate::camera::{Cascade, Eye, Light};
 use crate::forest::cull::bin_end;
 use crate::forest::seeds::SeedData;
 use crate::gpu::interface::{DISTANCE_BINS, View};
+use crate::physics::wind::Motion;
 use crate::plan::Plan;
 use crate::scene::Scene;
 
@@ -17,7 +18,7 @@ pub fn view(
     scene: &Scene,
     plan: &Plan,
     eye: &Eye,
-    light: &Light,
+    (light, motion): (&Light, Option<Motion>),
     cascades: &[Cascade],
     seeds: Option<&SeedData>,
     terrain_step: f64,
@@ -70,5 +71,12 @@ pub fn view(
     view.silhouette_step = plan.tallest as f32;
     view.height_cell = scene.terrain.cell_size as f32;
     view.cells_per_metre = (1.0 / scene.terrain.cell_size) as f32;
+    if let Some(m) = motion {
+        let ([x, y], [a, b, c], [d, e, f]) = (m.toward, m.waves, m.phases_at(ground));
+        view.wind = [x, y, m.gust, m.own].map(|v| v as f32);
+        view.wind_waves = [a, b, c, m.leaf].map(|v| v as f32);
+        view.wind_here = [d, e, f, m.branch].map(|v| v as f32);
+        view.wind_clock = m.clock;
+    }
     view
 }

@@ -199,7 +199,7 @@ impl World {
 /// # Errors
 /// [`Error::Usage`] with what differs, or does not suffice.
 pub(super) fn served(scene: &Scene, held: &Plan, wanted: &Plan) -> Result<Plan> {
-    let same = |a: &Plan, b: &Plan| -> [(&str, bool); 10] {
+    let same = |a: &Plan, b: &Plan| -> [(&str, bool); 11] {
         let grid = |p: &Plan| [p.quad_side, p.tile_side, p.pattern_density, p.plain_side].map(f64::to_bits);
         [
             ("ladder", a.ladder == b.ladder),
@@ -211,6 +211,7 @@ pub(super) fn served(scene: &Scene, held: &Plan, wanted: &Plan) -> Result<Plan> 
             ("tables", a.pair_tables == b.pair_tables),
             ("indirect light", a.indirect == b.indirect),
             ("sun", (a.sun, a.cascades) == (b.sun, b.cascades)),
+            ("wind", a.wind == b.wind),
             ("seed quads", grid(a) == grid(b) && a.region_capacity == b.region_capacity),
         ]
     };

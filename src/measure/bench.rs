@@ -68,6 +68,12 @@ impl Subject {
         let build_s = start.elapsed().as_secs_f64();
         Ok(Subject { renderer, cold: Cold { bake_s, bake_cache, build_s, ..Cold::default() } })
     }
+
+    /// Takes the time of a view of a path, which begins at the scene's.
+    fn set_time(&mut self, request: &Request, view: usize) {
+        let start = self.renderer.scene().time;
+        self.renderer.set_time(start + request.path.time_of(view, request.step));
+    }
 }
 
 /// The plan that holds every view: of the views' plans, each of which knows where the others are, the one that takes most
@@ -116,6 +122,7 @@ pub fn run(gpu: &Gpu, subjects: &mut [Subject], request: &Request, quiet: bool) 
         let exposure = auto_exposure(subject.renderer.scene());
         let mut draw = || -> Result<f64> {
             let start = Instant::now();
+            subject.set_time(request, 0);
             subject.renderer.render(&views[0], exposure)?;
             progress.step(1);
             Ok(start.elapsed().as_secs_f64())
@@ -136,6 +143,7 @@ pub fn run(gpu: &Gpu, subjects: &mut [Subject], request: &Request, quiet: bool) 
             let subject = &mut subjects[which];
             let pace_ms = pace.and_then(|()| pace_ms());
             let exposure = auto_exposure(subject.renderer.scene());
+            subject.set_time(request, view);
             let report = subject.renderer.render(&views[view], exposure)?;
             let place = [round as u32, view as u32];
             frames[which].push(Frame { pace_ms, ..frame(report, place, origin) });
@@ -148,7 +156,7 @@ pub fn run(gpu: &Gpu, subjects: &mut [Subject], request: &Request, quiet: bool) 
     progress.finish();
     let mut flows = Vec::new();
     for subject in subjects.iter_mut() {
-        flows.push(throughput(gpu, &mut subject.renderer, &views, request)?);
+        flows.push(throughput(gpu, subject, &views, request)?);
     }
     let host = Host::here(&gpu.info().name, request.validate);
     let finished = subjects.iter().zip(frames).zip(flows).map(|((subject, frames), throughput)| {
@@ -162,7 +170,7 @@ pub fn run(gpu: &Gpu, subjects: &mut [Subject], request: &Request, quiet: bool) 
 /// second there are when none waits for the one before. Passes are not timed, and so do not wait for each other's stamps.
 fn throughput(
     gpu: &Gpu,
-    renderer: &mut Renderer,
+    subject: &mut Subject,
     views: &[Camera],
     request: &Request,
 ) -> Result<Option<Throughput>> {
@@ -171,15 +179,16 @@ fn throughput(
         return Ok(None);
     }
     gpu.set_timing(TimingOptions { stamps: Stamps::None, ..TimingOptions::default() });
+    let renderer = &subject.renderer;
     let exposure = auto_exposure(renderer.scene());
     let eyes: Vec<Eye> =
         views.iter().map(|v| Eye::new(v, &renderer.scene().terrain, renderer.plan().size)).collect();
     let (frames, start) = ((request.frames as usize / 4).max(8), Instant::now());
     let limit = Duration::try_from_secs_f64(0.25 * request.duration).unwrap_or(Duration::MAX);
     let (mut waiting, mut ends, mut began) = (VecDeque::new(), Vec::new(), process_cpu_ns());
-    for eye in eyes.iter().cycle().take(in_flight + frames) {
+    for (view, eye) in eyes.iter().enumerate().cycle().take(in_flight + frames) {
         if waiting.len() == in_flight {
-            ends.extend(waiting.pop_front().map(|t| finish(renderer, t)).transpose()?);
+            ends.extend(waiting.pop_front().map(|t| finish(&mut subject.renderer, t)).transpose()?);
             if ends.len() == 1 {
                 began = process_cpu_ns();
             }
@@ -187,11 +196,13 @@ fn throughput(
                 break;
             }
         }
+        subject.set_time(request, view);
+        let renderer = &mut subject.renderer;
         let cascades = renderer.cascades(eye);
         waiting.push_back(renderer.submit(eye, &cascades, exposure)?);
     }
     for ticket in waiting {
-        ends.push(finish(renderer, ticket)?);
+        ends.push(finish(&mut subject.renderer, ticket)?);
     }
     gpu.set_timing(request.timing);
     let cpu_ms = process_cpu_ms_since(began);

@@ -11,7 +11,7 @@ const BUILTIN_SECONDS: f64 = 8.0;
 /// Most views of a path.
 const MOST_VIEWS: f64 = 100_000.0;
 
-/// Where the camera is at a time.
+/// Where the camera is at a time, which is the scene's: what the wind moves is as it is then.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Keyframe {
@@ -190,6 +190,11 @@ impl CameraPath {
         self.keyframes[self.keyframes.len() - 1].time - self.keyframes[0].time
     }
 
+    /// Time of the scene at one of its views ([`CameraPath::views`]), s.
+    pub fn time_of(&self, view: usize, step: f64) -> f64 {
+        self.keyframes[0].time + view as f64 * step
+    }
+
     /// The keyframes.
     pub fn keyframes(&self) -> &[Keyframe] {
         &self.keyframes
@@ -288,6 +293,8 @@ mod tests {
         let views = path.views(0.5).unwrap();
         assert_eq!(views.len(), 8);
         assert_eq!(views[3], path.at(1.5));
+        // The scene's time is that of the keyframes, which begin at one second.
+        assert_eq!([path.time_of(0, 0.5), path.time_of(3, 0.5)], [1.0, 2.5]);
         assert!(path.views(0.0).is_err() && path.views(-1.0).is_err() && path.views(f64::NAN).is_err());
     }
 

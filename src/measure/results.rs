@@ -120,6 +120,9 @@ impl SceneIdentity {
             put(format!("species {}", s.name), &(s.scale, &s.distribution), &model);
         }
         put("light".into(), &(scene.sun, &scene.sky), &[]);
+        if let Some(wind) = &scene.wind {
+            put("wind".into(), wind, &[]);
+        }
         SceneIdentity { name: scene.name.clone(), seed: scene.seed, assets }
     }
 }

@@ -19,4 +19,5 @@ pub mod terrain;
 pub mod tonemap;
 pub mod transfer;
 pub mod views;
+pub mod wind;
 pub mod zfield;

@@ -91,6 +91,9 @@ impl Plan {
         if self.meshes {
             self.list_meshes(scene, &mut items);
         }
+        if self.wind {
+            self.list_wind(scene, &mut items);
+        }
         if self.forest {
             self.list_tables(scene, &mut items);
             self.list_indirect(scene, &mut items);

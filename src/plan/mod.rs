@@ -87,6 +87,9 @@ pub struct Plan {
     pub layers: bool,
     /// Whether a sun shines.
     pub sun: bool,
+    /// Whether wind moves the trees; left out of reports where none does.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub wind: bool,
     /// Whether any tree stands in the scene.
     pub forest: bool,
     /// Whether trees are drawn one by one: any can come within the range of an eye. Without, the shader-map shows all.
@@ -254,6 +257,7 @@ impl Plan {
             samples: check::samples(s.samples, device),
             layers,
             sun: scene.sun.shines(),
+            wind: false,
             forest: false,
             z_fields: false,
             mesh_range: Vec::new(),

@@ -86,6 +86,12 @@ pub mod pipeline {
     pub const MESHES: &str = "meshes";
     /// Light on meshes.
     pub const MESH_LIGHT: &str = "mesh light";
+    /// What of all trees' pipelines sways them.
+    pub const SWAY: &str = "sway of trees";
+    /// What of meshes' pipelines moves their leaves.
+    pub const FLUTTER: &str = "flutter of leaves";
+    /// What of the ground's pipelines moves the shader-map.
+    pub const GUSTS: &str = "gusts over the shader-map";
     /// What of a tree's pipelines finds where the sun enters.
     pub const LIGHT_RAY: &str = "light ray of trees";
 }

@@ -23,6 +23,28 @@ const MESHES: &str = "the triangle of a mesh that each sample sees";
 const MESH_LIGHT: &str = "light on leaves and bark, once a pixel and triangle that it sees";
 
 impl Plan {
+    /// What the wind adds: no memory, because what a tree's sway takes is in words that its records have to spare.
+    pub(super) fn list_wind(&self, scene: &Scene, items: &mut Items) {
+        let Some(wind) = scene.wind else { return };
+        let mut add = |name: &str, reason: &str| items.step("pipeline", name, reason);
+        let shear = 100.0 * wind.shear();
+        if self.z_fields {
+            let from =
+                format!("wind of {} m/s: trees lean by up to {shear:.1} % of their height", wind.speed);
+            add(pipeline::SWAY, &from);
+        }
+        if self.meshes {
+            let angle = wind.flutter().to_degrees();
+            add(
+                pipeline::FLUTTER,
+                &format!("and leaves of meshes turn by up to {angle:.0} degrees about their middles"),
+            );
+        }
+        if self.ladder.averages() {
+            add(pipeline::GUSTS, "and the shader-map is looked up where gusts have moved crowns from");
+        }
+    }
+
     /// Whether trees of the shader-map are put before the sky where the ground ends: in tiles, and where none are drawn one by one
     /// there because the ground's silhouettes are looked for.
     pub fn horizon(&self) -> bool {
@@ -78,7 +100,9 @@ impl Plan {
             add(pass::CASTERS, "which trees cast shadows");
         }
         if self.cascades > 0 {
-            add(pass::SHADOWS, "the sun is up");
+            let still = "the sun is up";
+            let blown = "the sun is up, and what casts moves with the wind: at every time all of the maps is drawn anew";
+            add(pass::SHADOWS, if self.wind { blown } else { still });
         }
         if matches!(scene.sky, Sky::LatLong { .. }) {
             add(pass::SKY, "the sky is an image");

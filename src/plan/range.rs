@@ -9,10 +9,13 @@ impl Plan {
     pub(super) fn ranges(&mut self, scene: &Scene, eye: &Eye, places: &[[f64; 3]]) {
         let s = &scene.settings;
         self.forest = tree_density(scene) > 0.0;
+        self.wind = self.forest && scene.wind.is_some();
         for species in &scene.species {
             let scale = species.largest_scale();
             let reach = species.mesh.positions.iter().map(|p| p[0].hypot(p[1]).max(p[2])).fold(0.0, f32::max);
-            self.tallest = self.tallest.max(f64::from(reach) * scale);
+            // Bushes may reach as far to the sides as up, and farther where they sway.
+            let sway = scene.wind.map_or(0.0, |w| w.reach(f64::from(reach), f64::from(reach)));
+            self.tallest = self.tallest.max((f64::from(reach) + sway) * scale);
         }
         let farthest = self.farthest(scene, std::iter::once(&eye.position).chain(places));
         for species in &scene.species {

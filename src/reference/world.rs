@@ -7,12 +7,12 @@ use glam::{DVec3, Vec3};
 use super::ground::Ground;
 use super::key::Key;
 use super::trees;
-use crate::Result;
 use crate::bake::foliage::Foliage;
 use crate::bake::grove::Grove;
 use crate::camera::{Eye, Light};
 use crate::rays::Stack;
 use crate::scene::{Scene, Sky};
+use crate::{Error, Result};
 
 /// Rays leave the ground at this height, m: far above the rounding of doubles, and so low that next to a crease hardly any
 /// starts under the other side of it.
@@ -54,8 +54,13 @@ impl World {
     /// The world around what these eyes see.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] when that takes more than [`trees::MOST_TREES`] trees, or for a mesh without extent.
+    /// [`crate::Error::Usage`] for a scene with wind, when that takes more than [`trees::MOST_TREES`] trees, or for a mesh without extent.
     pub fn new(scene: &Scene, eyes: &[Eye]) -> Result<Self> {
+        if scene.wind.is_some() {
+            return Err(Error::Usage(
+                "the reference knows no wind, and its trees stand still: leave out [wind], or give it a speed of 0".into(),
+            ));
+        }
         let light = Light::new(scene);
         let (trees, origin) = trees::collect(scene, eyes, light.direction)?;
         let foliage = |s: &crate::scene::Species| Ok(Arc::new(Foliage::new(&s.mesh, &s.optics)?));

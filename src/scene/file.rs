@@ -1,7 +1,7 @@
 //! The scene file: TOML to a validated [`Scene`].
 //!
 //! Required: `[terrain]` and one `[[camera]]`. Left out: `name` is the file's stem, `seed` 0, `[[species]]` none, `[sun]`
-//! no sun, `[sky]` black, `[quality]` the balanced preset. Everything else that is left out, unknown or out of range is
+//! no sun, `[sky]` black, `[wind]` none, `[quality]` the balanced preset. Everything else that is left out, unknown or out of range is
 //! an error that names the line.
 
 mod species;
@@ -16,6 +16,7 @@ use super::{Camera, Scene, Sky, Sun, texture};
 use crate::input::read_text;
 use crate::keys::{Item, Source, Table};
 use crate::ladder::{Ladder, LadderError};
+use crate::physics::wind::Wind;
 use crate::settings::{KNOBS, PRESETS, Settings, nearest};
 use crate::{Error, Result};
 
@@ -23,6 +24,9 @@ const MAX_BYTES: u64 = 16 << 20;
 
 /// Largest coordinate or extent, m.
 const MAX_METRES: f64 = 1e7;
+
+/// Largest speed of the wind, m/s: that of the strongest storms.
+const MAX_WIND: f64 = 100.0;
 
 /// Largest irradiance or radiance.
 const MAX_LIGHT: f64 = 1e6;
@@ -63,7 +67,7 @@ fn read(text: &str, path: &Path, preset: Option<&str>) -> Result<Scene> {
     })?;
     let source = Source { path, text };
     let document = DeTable::parse(text).map_err(|e| source.syntax(&e))?;
-    let known = ["name", "seed", "terrain", "species", "sun", "sky", "camera", "quality"];
+    let known = ["name", "seed", "terrain", "species", "sun", "sky", "wind", "camera", "quality"];
     let root = Table::root(&source, document.get_ref(), &known)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let (settings, ladder) = match root.get("quality") {
@@ -82,6 +86,8 @@ fn read(text: &str, path: &Path, preset: Option<&str>) -> Result<Scene> {
             .get("sun")
             .map_or(Ok(Sun { azimuth: 0.0, elevation: 90.0, irradiance: [0.0; 3] }), |i| sun(&i))?,
         sky: root.get("sky").map_or(Ok(Sky::Uniform([0.0; 3])), |i| sky(&i, folder))?,
+        wind: root.get("wind").map_or(Ok(None), |i| wind(&i))?,
+        time: 0.0,
         species: root.get("species").map_or(Ok(Vec::new()), |i| species::read_all(&i, folder, &terrain))?,
         terrain,
     })
@@ -137,6 +143,17 @@ fn sky(item: &Item, folder: &Path) -> Result<Sky> {
         true => texture::load_sky(&existing(&radiance, folder)?),
         false => radiance.color(0.0..=MAX_LIGHT).map(Sky::Uniform),
     }
+}
+
+/// A wind of no speed is none.
+fn wind(item: &Item) -> Result<Option<Wind>> {
+    let table = item.table(&["speed", "azimuth", "gustiness"])?;
+    let wind = Wind {
+        speed: table.require("speed")?.number(0.0..=MAX_WIND, "m/s")?,
+        azimuth: table.require("azimuth")?.number(-360.0..=360.0, "degrees")?,
+        gustiness: table.require("gustiness")?.number(0.0..=1.0, "")?,
+    };
+    Ok((wind.speed > 0.0).then_some(wind))
 }
 
 fn cameras(item: &Item, origin: [f64; 2]) -> Result<Vec<Camera>> {

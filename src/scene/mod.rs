@@ -18,6 +18,7 @@ use crate::physics::light::sun_disc_fraction;
 use crate::physics::raster::Raster;
 use crate::physics::terrain::height_and_slope;
 use crate::physics::tonemap;
+use crate::physics::wind::Wind;
 use crate::settings::{Settings, nearest};
 use crate::{Error, Result};
 pub use file::{default_scene, load, load_at, parse};
@@ -38,6 +39,10 @@ pub struct Scene {
     pub sun: Sun,
     /// The sky.
     pub sky: Sky,
+    /// The wind; `None` where nothing moves.
+    pub wind: Option<Wind>,
+    /// Time of the first frame, s: of a scene without wind all times are alike.
+    pub time: f64,
     /// At least one camera; the first is the default.
     pub cameras: Vec<Camera>,
     /// Preset and knobs.

@@ -33,4 +33,5 @@ mod tiles;
 mod transfer;
 mod tree;
 mod views;
+mod wind;
 mod zfield;

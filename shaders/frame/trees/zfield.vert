@@ -7,6 +7,7 @@
 #include "physics/light.glsl"
 #include "physics/transfer.glsl"
 #include "physics/zfield.glsl"
+#include "forest/wind.glsl"
 #include "frame/trees/zfield_space.glsl"
 #include "frame/camera.glsl"
 #include "frame/trees/tiles/box.glsl"
@@ -47,9 +48,9 @@ void main() {
     View v = view.v;
     uint index = lists.items[gl_VertexIndex >> 2];
     Tree t = trees.items[index];
-    Species kind = species.items[t.species];
+    Species kind = species.items[species_row(t.species)];
     TreePlane plane = tree_plane(t, kind);
-    vec3 c = (tree_rotation(t) * -t.centre) / plane.half_extent;
+    vec3 c = resting(t, -t.centre) / plane.half_extent;
 
     vec3 layers = unpack_layers(t.view_layers, kind.first_layer);
     vec3 light_layers = unpack_layers(t.light_layers, kind.first_layer);
@@ -62,7 +63,7 @@ void main() {
     vec3 position = world_from_tree(t, kind, p);
     gl_Position = v.clip_from_world * vec4(position, 1.0);
 
-    vec3 toward = tree_rotation(t) * v.sun_direction;
+    vec3 toward = resting(t, v.sun_direction);
     vec3 l = toward / plane.half_extent;
     for (int i = 0; i < 3; i++) {
         ViewBasis b = bases.items[uint(layers[i])];
@@ -83,13 +84,14 @@ void main() {
     weights = vec4(t.view_weights, t.light_weights);
     // The model's metres: what is in a crown grows with it.
     float phase_angle = angle_between(-t.centre, v.sun_direction);
+    if (WIND) toward = normalize(toward);
     sun_from = vec4(toward, transfer_strength(sqrt(phase_angle)));
     optics = vec4(t.mip, kind.extinction * phase_angle / t.scale, t.fade, c.z);
     vec2 hole = unpackHalf2x16(t.hole_change), weight = unpackHalf2x16(t.own_lit), lit = unpackHalf2x16(t.mean_lit_change);
     sun = vec4(t.sun, hole.x);
     sky = vec4(t.sky, plane.half_extent.z);
     uvec3 row = masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz;
-    tree_bits = uvec4(row, cascade_of(t) | (below ? 16u : 0u) | t.species << 5u | caster_name(t.identity) << 8u | (t.mean_lit_change & 0xffff0000u));
+    tree_bits = uvec4(row, cascade_of(t) | (below ? 16u : 0u) | species_row(t.species) << 5u | caster_name(t.identity) << 8u | (t.mean_lit_change & 0xffff0000u));
     handed = uvec4(0u);
     handed_sky = uvec2(0u);
     if (INDIRECT) {

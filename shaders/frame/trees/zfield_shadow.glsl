@@ -1,5 +1,6 @@
 // A quad around one tree that faces the sun, in one block of a cascade; where LAYERED the layer is chosen here.
 #include "physics/zfield.glsl"
+#include "forest/wind.glsl"
 #include "frame/trees/zfield_space.glsl"
 
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
@@ -19,9 +20,9 @@ layout(location = 9) flat out uint dither;
 
 void main() {
     Caster t = casters.items[gl_VertexIndex >> 2];
-    Species kind = species.items[t.species];
+    Species kind = species.items[species_row(t.species)];
     vec3 half_extent = kind.scale_to_metres * t.scale;
-    vec3 l = (rotation_back(t.turn) * view.v.sun_direction) / half_extent;
+    vec3 l = unswayed(t.species, rotation_back(t.turn) * view.v.sun_direction) / half_extent;
     vec3 w = normalize(l), right, up;
     frame_across(w, right, up);
     vec3 layers = unpack_layers(t.light_layers, kind.first_layer);
@@ -30,7 +31,7 @@ void main() {
     vec2 margin = exp2(t.mip) / VIEW_RESOLUTION * vec2(1.0, length(w.xy) + w.z);
     vec3 p = right * ((gl_VertexIndex & 1) == 0 ? extent.x - margin.x : extent.y + margin.x) +
              up * ((gl_VertexIndex & 2) == 0 ? extent.z - margin.y : extent.w + margin.y);
-    vec3 m = rotated(t.turn, p * half_extent);
+    vec3 m = rotated(t.turn, swayed(t.species, p * half_extent));
     vec3 at = t.place + vec3(dot(block.x, m), dot(block.y, m), dot(block.z, m));
     for (int i = 0; i < 3; i++) {
         ViewBasis b = bases.items[uint(layers[i])];

@@ -1,4 +1,4 @@
-// From the world to the scaled space of one tree, where its z-field lives.
+// From the world to the scaled space of one tree, where its z-field lives. Needs forest/wind.glsl.
 
 // A tree's record, of eight texels.
 Tree fetch_tree(usamplerBuffer trees, uint index) {
@@ -63,9 +63,15 @@ vec3 rotated(vec2 turn, vec3 m) { return vec3(turn.x * m.x - turn.y * m.y, turn.
 // Rotation back by the tree's turn.
 mat3 tree_rotation(Tree t) { return rotation_back(t.turn); }
 
+// The row of its species.
+uint species_row(uint word) { return word & TREE_SPECIES; }
+
+// A vector of the world in the tree's own axes, as if the tree stood still.
+vec3 resting(Tree t, vec3 d) { return unswayed(t.species, tree_rotation(t) * d); }
+
 // A point of scaled tree space in the world, from the camera.
 vec3 world_from_tree(Tree t, Species kind, vec3 p) {
-    return t.centre + rotated(t.turn, p * kind.scale_to_metres * t.scale);
+    return t.centre + rotated(t.turn, swayed(t.species, p * kind.scale_to_metres * t.scale));
 }
 
 // A point or direction in a view: (u - 1/2, v - 1/2, depth).

@@ -2,6 +2,7 @@
 
 use crate::forest::cull::CullData;
 use crate::forest::meshes::MeshData;
+use crate::forest::species::SpeciesData;
 use crate::frame::Forest;
 use crate::frame::targets::ImageTargets;
 use crate::gpu::interface::{
@@ -45,7 +46,7 @@ impl Meshes {
                 colors: &[vk::Format::R32_UINT],
                 samples: plan.samples,
                 depth: DepthTest::Reverse,
-                constants: &[("SAMPLES", plan.samples)],
+                constants: &[("SAMPLES", plan.samples), ("WIND", u32::from(plan.wind))],
             })?,
             light: gpu.compute(
                 light,
@@ -55,6 +56,7 @@ impl Meshes {
                     ("LEAF_DIRECTIONS", scene.settings.leaf_directions),
                     ("LEAF_POWER", data.power),
                     ("INDIRECT", u32::from(plan.indirect > 0)),
+                    ("WIND", u32::from(plan.wind)),
                     ("VIEW_MODE", plan.view_mode as u32),
                 ],
             )?,
@@ -68,6 +70,7 @@ impl Meshes {
         &self,
         recorder: &mut Recorder,
         view: &Buffer,
+        species: &SpeciesData,
         (cull, data, range): (&CullData, &MeshData, f64),
         targets: &ImageTargets,
     ) {
@@ -75,6 +78,7 @@ impl Meshes {
             ("view", Resource::Buffer(view)),
             ("trees", Resource::Texels(&cull.trees)),
             ("lists", Resource::Buffer(&cull.lists)),
+            ("species", Resource::Buffer(&species.table)),
             ("starts", Resource::Buffer(&cull.starts)),
             ("totals", Resource::Buffer(&cull.totals)),
             ("draws", Resource::Buffer(&data.draws)),

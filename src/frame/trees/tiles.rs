@@ -62,6 +62,7 @@ impl TreeTiles {
         let make = |b: &TileBuffer| gpu.described_buffer(&plan.buffer(b.desc.name));
         let lists = sizes.lists;
         let resolution = (s.view_resolution as f32).to_bits();
+        let wind = ("WIND", u32::from(plan.wind));
         let before = s.view_iterations - 1;
         let see: &'static Shader = if plan.samples > 1 {
             &shaders::FRAME_TREES_TILES_SEE_COMP
@@ -90,7 +91,7 @@ impl TreeTiles {
             state: make(&sizes.state)?,
             seen: make(&sizes.seen)?,
             depths: make(&sizes.depths)?,
-            order_count: gpu.compute(&shaders::FRAME_TREES_TILES_ORDER_COUNT_COMP, &[])?,
+            order_count: gpu.compute(&shaders::FRAME_TREES_TILES_ORDER_COUNT_COMP, &[wind])?,
             order_fill: gpu.compute(&shaders::FRAME_TREES_TILES_ORDER_FILL_COMP, &[])?,
             scan: gpu.compute(&shaders::FRAME_TREES_TILES_SCAN_COMP, &[])?,
             sight: gpu.compute(
@@ -100,6 +101,7 @@ impl TreeTiles {
                     ("VIEW_RESOLUTION", resolution),
                     ("MASK_ROWS", mask_rows),
                     ("SAMPLES", plan.samples),
+                    wind,
                 ],
             )?,
             entries_count: gpu.compute(&shaders::FRAME_TREES_TILES_ENTRIES_COUNT_COMP, &[])?,
@@ -112,6 +114,7 @@ impl TreeTiles {
                     ("SHORTCUTS", u32::from(plan.tile_shortcuts)),
                     ("OUTLINE_ROWS", outline::ROWS as u32),
                     ("VIEW_LEVELS", s.view_resolution.ilog2() + 1),
+                    wind,
                 ],
             )?,
             shade: gpu.compute(
@@ -129,6 +132,7 @@ impl TreeTiles {
                     ("TRANSFER_BANDS", plan.transfer_bands),
                     ("TRANSFER_LEVELS", (s.view_resolution / s.transfer_side()).ilog2()),
                     ("INDIRECT", u32::from(plan.indirect > 0)),
+                    wind,
                     ("VIEW_MODE", plan.view_mode as u32),
                 ],
             )?,

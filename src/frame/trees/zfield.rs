@@ -44,6 +44,7 @@ impl Trees {
                 ("TRANSFER_BANDS", plan.transfer_bands),
                 ("TRANSFER_LEVELS", (s.view_resolution / s.transfer_side()).ilog2()),
                 ("INDIRECT", u32::from(plan.indirect > 0)),
+                ("WIND", u32::from(plan.wind)),
             ];
             if plan.view_mode != ViewMode::Radiance {
                 constants.push(("VIEW_MODE", plan.view_mode as u32));

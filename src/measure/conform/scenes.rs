@@ -10,6 +10,9 @@ use crate::{Error, Result};
 /// Size of the pictures.
 pub const SIZE: [u32; 2] = [128, 96];
 
+/// Time of the pictures, s: some way into what the wind does.
+const TIME: f64 = 3.0;
+
 /// One picture of the suite.
 pub struct SceneCase {
     pub name: &'static str,
@@ -20,6 +23,8 @@ pub struct SceneCase {
     sun: [f64; 3],
     /// Radiance of the sky.
     pub sky: f64,
+    /// Speed of the wind, m/s; 0: none.
+    wind: f64,
     knobs: &'static [(&'static str, f64)],
     pub mode: ViewMode,
 }
@@ -38,6 +43,7 @@ const GROVE: SceneCase = SceneCase {
     camera: ([560.0, 560.0, 12.0], [600.0, 600.0, 6.0], 50.0),
     sun: [210.0, 35.0, 1.0],
     sky: 0.08,
+    wind: 0.0,
     knobs: &[],
     mode: ViewMode::Radiance,
 };
@@ -87,6 +93,7 @@ pub const ALL: &[SceneCase] = &[
     },
     SceneCase { name: "light-transfer", knobs: &[("transfer_bands", 1.0)], ..GROVE },
     SceneCase { name: "all-orders", knobs: &[("indirect", 1.0)], ..HILLS },
+    SceneCase { name: "windy", wind: 15.0, ..GROVE },
     SceneCase { name: "mode-fractions", mode: ViewMode::Fractions, ..GROVE },
     SceneCase { name: "mode-coverage", mode: ViewMode::Coverage, ..ABOVE },
     SceneCase { name: "mode-lod", mode: ViewMode::Lod, ..HILLS },
@@ -107,13 +114,14 @@ impl SceneCase {
         let [azimuth, elevation, irradiance] = self.sun;
         let text = format!(
             "name = \"{}\"\nseed = 7\n{}[sun]\nazimuth = {azimuth:?}\nelevation = {elevation:?}\nirradiance = {irradiance:?}\n\
-             [sky]\nradiance = {:?}\n\
+             [sky]\nradiance = {:?}\n[wind]\nspeed = {:?}\nazimuth = 300.0\ngustiness = 0.7\n\
              [[camera]]\nname = \"c\"\nposition = {position:?}\ntarget = {target:?}\nvertical_fov = {fov:?}\n\
              [quality]\npreset = \"fast\"\nview_rings = 4\nview_resolution = 64\nocclusion_rays = 16\ncascade_size = 256\n\
              coverage_size = 64\nzfield_min_pixels = 4.0\ntable_angles = 8\ntable_densities = 4\ntable_rays = 128\n",
-            self.name, self.ground, self.sky
+            self.name, self.ground, self.sky, self.wind
         );
         let mut scene = scene::parse(&text, Path::new(self.name))?;
+        scene.time = TIME;
         for (knob, value) in self.knobs {
             scene.settings.set(knob, *value)?;
         }

@@ -5,6 +5,7 @@
 #include "physics/shadow.glsl"
 #include "physics/leaf.glsl"
 #include "physics/indirect.glsl"
+#include "forest/wind.glsl"
 #include "frame/trees/zfield_space.glsl"
 #include "frame/surfaces_seen.glsl"
 #include "frame/trees/meshes/corner.glsl"
@@ -84,15 +85,25 @@ Shown shade(uint what, vec3 world) {
     View v = view.v;
     uint index = mesh_trees.items[seen_tree(what)];
     Tree t = fetch_tree(trees, index);
-    Species kind = species.items[t.species];
-    uint face = draws.items[t.species].first_face + seen_triangle(what);
+    uint row = species_row(t.species);
+    Species kind = species.items[row];
+    uint face = draws.items[row].first_face + seen_triangle(what);
     mat3 back = tree_rotation(t);
     vec3 a = corner_place(texelFetch(corners, int(3u * face))), viewer = back * normalize(-world), sun = back * v.sun_direction;
-    vec3 n = normalize(cross(corner_place(texelFetch(corners, int(3u * face + 1u))) - a, corner_place(texelFetch(corners, int(3u * face + 2u))) - a));
-    bool leaf = texelFetch(faces, int(face)).y != 0u;
+    vec3 b = corner_place(texelFetch(corners, int(3u * face + 1u))), c = corner_place(texelFetch(corners, int(3u * face + 2u)));
+    uvec4 is = texelFetch(faces, int(face));
+    if (WIND) {
+        Motion m = motion_of(v);
+        uint name = caster_name(t.identity);
+        a = blown(m, t.species, name, is, kind.scale_to_metres, a);
+        b = blown(m, t.species, name, is, kind.scale_to_metres, b);
+        c = blown(m, t.species, name, is, kind.scale_to_metres, c);
+    }
+    vec3 n = normalize(cross(b - a, c - a));
+    bool leaf = (is.y & 1u) != 0u;
     // Bark has one side, that which is seen.
     if (!leaf && dot(n, viewer) < 0.0) n = -n;
-    vec3 reflectance = optics.items[3u * t.species + (leaf ? 0u : 2u)].rgb, transmittance = leaf ? optics.items[3u * t.species + 1u].rgb : vec3(0.0);
+    vec3 reflectance = optics.items[3u * row + (leaf ? 0u : 2u)].rgb, transmittance = leaf ? optics.items[3u * row + 1u].rgb : vec3(0.0);
     vec2 hole = unpackHalf2x16(t.hole_change), own = unpackHalf2x16(t.own_lit), lit = unpackHalf2x16(t.mean_lit_change);
     float above_middle = (back * (world - t.centre)).z, height = above_middle / (kind.scale_to_metres.z * t.scale);
     HandedLight handed = nothing_handed();
@@ -170,7 +181,7 @@ void main() {
         if (covered != 0u) store_pixel(pixel, all);
 #ifdef LAYERS
         if (first != ~0u) {
-            uint kind = texelFetch(trees, int(mesh_trees.items[seen_tree(ranks[first])]) * 8 + 1).z;
+            uint kind = species_row(texelFetch(trees, int(mesh_trees.items[seen_tree(ranks[first])]) * 8 + 1).z);
             store_first(pixel, kind + 1u, surface_depth(pixel, 0));
         }
 #endif

@@ -19,7 +19,7 @@ shared uint found[MAX_SPECIES];
 // The species of the tree at a place of the lists; MAX_SPECIES where it is no mesh.
 uint species_at(uint place, uint end) {
     int at = int(lists.items[min(place, max(end, 1u) - 1u)]) * 8;
-    uint species = texelFetch(trees, at + 1).z, samples = texelFetch(trees, at + 5).w >> 8u & 0xffu;
+    uint species = texelFetch(trees, at + 1).z & TREE_SPECIES, samples = texelFetch(trees, at + 5).w >> 8u & 0xffu;
     return place < end && samples > 0u ? species : MAX_SPECIES;
 }
 

@@ -3,6 +3,7 @@
 struct TreePlane {
     vec3 half_extent;  // m
     vec2 turn;         // cosine and sine
+    uint sway;         // in the word of the tree's species
     vec3 w;            // unit vector to the eye, in tree space; across it lies the plane
     float far;         // distance of the eye, in tree space
     vec3 right, up;    // unit vectors of the plane
@@ -13,7 +14,8 @@ TreePlane tree_plane(Tree t, Species kind) {
     TreePlane p;
     p.half_extent = kind.scale_to_metres * t.scale;
     p.turn = t.turn;
-    vec3 c = (tree_rotation(t) * -t.centre) / p.half_extent;
+    p.sway = t.species;
+    vec3 c = resting(t, -t.centre) / p.half_extent;
     p.far = max(length(c), 1e-6);
     p.w = c / p.far;
     frame_across(p.w, p.right, p.up);
@@ -23,7 +25,7 @@ TreePlane tree_plane(Tree t, Species kind) {
 
 // A direction of the world in tree space.
 vec3 to_tree(TreePlane p, vec3 d) {
-    return vec3(p.turn.x * d.x + p.turn.y * d.y, p.turn.x * d.y - p.turn.y * d.x, d.z) / p.half_extent;
+    return unswayed(p.sway, vec3(p.turn.x * d.x + p.turn.y * d.y, p.turn.x * d.y - p.turn.y * d.x, d.z)) / p.half_extent;
 }
 
 // Extents of the quad. From afar they are the tree's; near, points before the plane look larger by far / (far - depth), and

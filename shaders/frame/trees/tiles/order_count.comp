@@ -2,6 +2,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
+#include "forest/wind.glsl"
 #include "frame/trees/tiles/order.glsl"
 
 layout(local_size_x = 8) in;
@@ -25,8 +26,11 @@ void main() {
     vec3 forward = vec3(m[0].w, m[1].w, m[2].w);
     for (uint k = lane * part; k < last; k++) {
         uint tree = lists.items[k];
-        vec3 extent = species.items[trees.items[tree].species].scale_to_metres * trees.items[tree].scale;
+        uint word = trees.items[tree].species;
+        vec3 extent = species.items[word & TREE_SPECIES].scale_to_metres * trees.items[tree].scale;
         float support = extent.x * length(forward.xy) + extent.z * abs(forward.z);
+        // A sheared cylinder reaches farther.
+        if (WIND) support += extent.z * length(forward.xy) * length(unpack_sway(word));
         uint bin = depth_bin(dot(forward, trees.items[tree].centre) - support);
         keys.items[k] = bin;
         counts.items[bin * ORDER_LANES + lane] += 1u;

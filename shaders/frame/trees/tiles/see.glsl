@@ -6,6 +6,7 @@
 #include "physics/masks.glsl"
 #include "frame/trees/tiles/fetch.glsl"
 #include "physics/zfield.glsl"
+#include "forest/wind.glsl"
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/tiles/order.glsl"
 #include "frame/trees/tiles/sight.glsl"

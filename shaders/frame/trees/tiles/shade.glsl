@@ -10,6 +10,7 @@
 #include "physics/shadow.glsl"
 #include "physics/transfer.glsl"
 #include "physics/indirect.glsl"
+#include "forest/wind.glsl"
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/zfield_light.glsl"
 #include "frame/camera.glsl"
@@ -45,7 +46,7 @@ Shown shade(uint rank, vec2 offset, out float depth) {
     View v = view.v;
     uint who = texelFetch(ranked, int(rank)).x, draw = who >> 30u;
     Tree t = fetch_tree(trees, who & 0x3fffffffu);
-    Species kind = species.items[t.species];
+    Species kind = species.items[species_row(t.species)];
     TreePlane plane = tree_plane(t, kind);
     Camera camera = camera_of(v, vec2(p.size));
     vec3 direction = camera.forward + offset.x * camera.right + offset.y * camera.down;
@@ -67,8 +68,9 @@ Shown shade(uint rank, vec2 offset, out float depth) {
     Surface surface = zfield_search(views, at, to, layers, vec3(t.view_weights, 1.0 - t.view_weights.x - t.view_weights.y), t.mip,
                                     magnified ? 0u : before, magnified ? before : 0u, below);
     float s = clamp(surface.s, -1e3, 0.999);
-    vec3 found = mix(point, c, s), toward = tree_rotation(t) * v.sun_direction;
+    vec3 found = mix(point, c, s), toward = resting(t, v.sun_direction);
     vec3 metre = toward / plane.half_extent;
+    if (WIND) toward = normalize(toward);
     vec3 world = world_from_tree(t, kind, found);
     depth = min(v.clip_from_world[3].z / max(dot(camera.forward, world), 1e-6), 1.0);
     LightRay ray;
@@ -105,7 +107,7 @@ Shown shade(uint rank, vec2 offset, out float depth) {
 // Species of a tree.
 uint species_of(uint rank) {
     uint tree = texelFetch(ranked, int(rank)).x & 0x3fffffffu;
-    return texelFetch(trees, int(tree) * 8 + 1).z;
+    return species_row(texelFetch(trees, int(tree) * 8 + 1).z);
 }
 
 uint sample_sees(ivec2 pixel, int k) { return texelFetch(seen, int((pixel.y * int(p.size.x) + pixel.x) * int(SAMPLES)) + k).x; }

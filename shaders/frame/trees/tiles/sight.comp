@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
 #include "physics/hash.glsl"
+#include "forest/wind.glsl"
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/tiles/order.glsl"
 #include "frame/trees/tiles/sight.glsl"
@@ -51,7 +52,7 @@ void main() {
     View v = view.v;
     uint place = order.items[rank], index = lists.items[place];
     Tree t = fetch_tree(trees, index);
-    Species kind = species.items[t.species];
+    Species kind = species.items[species_row(t.species)];
     TreePlane plane = tree_plane(t, kind);
     vec3 layers = unpack_layers(t.view_layers, kind.first_layer);
     ViewBasis around[3];
