@@ -175,7 +175,7 @@ impl Canvas {
             reads.tiles = Some(tiles.read_state(recorder)?);
         }
         if let Some((pass, (_, _, data))) = passes.meshes.as_ref().zip(world.meshes()) {
-            reads.meshes = Some(pass.read_draws(recorder, data)?);
+            reads.meshes = Some(pass.read_kinds(recorder, data)?);
         }
         Ok(())
     }

@@ -348,7 +348,7 @@ impl Shadows {
             program,
             &[
                 ("casters", Resource::Buffer(&trees.data.casters)),
-                ("draws", Resource::Buffer(&meshes.draws)),
+                ("kinds", Resource::Buffer(&meshes.kinds)),
                 ("corners", Resource::Texels(&meshes.corners)),
                 ("faces", Resource::Texels(&meshes.faces)),
                 ("masks", Resource::Texture(&meshes.masks, Sampler::LinearRepeat)),

@@ -1,4 +1,4 @@
-// Corners of the meshes of a species' trees.
+// Corners of a tree that is a mesh.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
@@ -7,27 +7,31 @@
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/meshes/seen.glsl"
 #include "frame/trees/meshes/corner.glsl"
+#include "physics/levels.glsl"
+#include "frame/trees/meshes/level.glsl"
 
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 1) uniform usamplerBuffer trees;
-layout(std430, binding = 2) readonly buffer Draws { MeshDraw items[]; } draws;
-layout(std430, binding = 3) readonly buffer MeshTrees { uint items[]; } mesh_trees;
+layout(std430, binding = 2) readonly buffer Kinds { MeshKind items[]; } kinds;
+layout(std430, binding = 3) readonly buffer MeshTrees { MeshTree items[]; } mesh_trees;
 layout(binding = 4) uniform usamplerBuffer corners;
 layout(binding = 5) uniform usamplerBuffer faces;
-layout(push_constant) uniform Push { uint species; };
+layout(push_constant) uniform Push { uint first; }; // tree of the first draw
 layout(constant_id = 0) const uint SAMPLES = 4u;
 
 layout(location = 0) out vec2 uv;
 layout(location = 1) flat out uvec4 what; // what samples see; in which samples; layer of the mask; dither of the mask's opacity
 
 void main() {
-    MeshDraw d = draws.items[species];
-    uint place = d.first_tree + uint(gl_InstanceIndex), face = uint(gl_VertexIndex) / 3u;
-    Tree t = fetch_tree(trees, mesh_trees.items[place]);
-    uvec4 corner = texelFetch(corners, gl_VertexIndex);
-    gl_Position = view.v.clip_from_world * vec4(world_from_model(t, corner_place(corner)), 1.0);
+    uint place = first + uint(gl_InstanceIndex), face = uint(gl_VertexIndex) / 3u;
+    MeshTree shown = mesh_trees.items[place];
+    Tree t = fetch_tree(trees, shown.tree);
+    uvec4 corner = texelFetch(corners, gl_VertexIndex), is = texelFetch(faces, int(face));
+    vec3 at = levelled(corner_place(corner), is, shown, kinds.items[t.species].half_box);
+    gl_Position = view.v.clip_from_world * vec4(world_from_model(t, at), 1.0);
     uv = corner_uv(corner);
     uint dither = uint(unit(hash(t.identity ^ HASH_DITHER)) * 1024.0);
     uint mask = mesh_mask(mesh_count(t), dither, SAMPLES);
-    what = uvec4(mesh_seen(place, face - d.first_face), mask, texelFetch(faces, int(face)).x, hash2(t.identity, face));
+    uint triangle = face - kinds.items[t.species].first_face;
+    what = uvec4(mesh_seen(place, triangle), mask, is.x, hash2(t.identity, kinds.items[t.species].first_name + triangle));
 }

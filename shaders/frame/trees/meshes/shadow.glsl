@@ -1,10 +1,11 @@
 // Corners of the meshes that cast into a block of a cascade whose texels tell leaves apart; where LAYERED the layer is chosen here. All species
-// are drawn together, with as many corners as the largest has: of others the rest is nowhere.
+// are drawn together, with as many corners as the largest has: of others the rest is nowhere. Casters are whole: maps are kept from frame to frame, and who casts
+// into them does not depend on where the camera is, so neither may what is drawn of it.
 #include "frame/trees/zfield_space.glsl"
 #include "frame/trees/meshes/corner.glsl"
 
 layout(std430, binding = 1) readonly buffer Casters { Caster items[]; } casters;
-layout(std430, binding = 2) readonly buffer Draws { MeshDraw items[]; } draws;
+layout(std430, binding = 2) readonly buffer Kinds { MeshKind items[]; } kinds;
 layout(binding = 4) uniform usamplerBuffer corners;
 layout(binding = 5) uniform usamplerBuffer faces;
 layout(push_constant) uniform Push {
@@ -18,15 +19,15 @@ layout(location = 2) flat out uvec3 what; // layer of the mask, dither of its op
 
 void main() {
     Caster t = casters.items[first_caster + uint(gl_InstanceIndex)];
-    MeshDraw d = draws.items[t.species];
+    uint first_face = kinds.items[t.species].first_face;
     uint face = uint(gl_VertexIndex) / 3u;
-    bool is = face < d.face_count;
-    uvec4 corner = texelFetch(corners, int(d.first_vertex) + (is ? gl_VertexIndex : 0));
+    bool is = face < kinds.items[t.species].face_count;
+    uvec4 corner = texelFetch(corners, int(3u * first_face) + (is ? gl_VertexIndex : 0));
     vec3 m = rotated(t.turn, corner_place(corner) * t.scale);
     vec3 at = t.place + vec3(dot(block.x, m), dot(block.y, m), dot(block.z, m));
     uv = corner_uv(corner);
     depth = at.z;
-    what = uvec3(texelFetch(faces, int(d.first_face + (is ? face : 0u))).x, t.dither + face * 2654435769u, t.dither);
+    what = uvec3(texelFetch(faces, int(first_face + (is ? face : 0u))).x, t.dither + face * 2654435769u, t.dither);
     // What is before the cascade's near side casts from there: the fragment writes its depth.
     gl_Position = is ? vec4(at.xy * block.to_clip - 1.0, 0.5, 1.0) : vec4(0.0, 0.0, 0.5, 1.0);
 #ifdef LAYERED

@@ -1,0 +1,83 @@
+//! Levels of detail of a species' mesh: the order in which its leaves are thinned, coarser bark, and how much wider fewer leaves have to be
+//! (`src/physics/levels.rs` has the laws by which they are chosen).
+
+pub(super) mod bark;
+mod cards;
+mod coverage;
+mod nearest;
+
+pub use bark::{BarkLevel, NewFace};
+pub use cards::Cards;
+pub use coverage::DIRECTIONS;
+pub(crate) use coverage::{silhouette, spread};
+
+use glam::Vec3;
+
+use super::envelope::Parts;
+use super::surface::{Face, Surface};
+use crate::physics::levels::{OCTAVES, card_scale, card_weight};
+
+/// A species' levels of detail.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Levels {
+    /// Its leaves.
+    pub cards: Cards,
+    /// Factor of the area of cards on top of 1/u, at shares u of 1, 1/2, 1/4 and so on.
+    pub widening: [f64; OCTAVES],
+    /// Its bark, from the whole to the coarsest.
+    pub bark: Vec<BarkLevel>,
+}
+
+impl Levels {
+    /// Makes them; the same bits on any number of threads.
+    pub fn new(surface: &Surface, parts: &Parts) -> Self {
+        let mut levels = Levels::whole(surface, parts);
+        levels.bark.extend(bark::simplified(surface, &levels.bark[0].kept));
+        levels.widening = coverage::widening(surface, &levels);
+        levels
+    }
+
+    /// The leaves' order, and the whole bark alone.
+    pub(super) fn whole(surface: &Surface, parts: &Parts) -> Self {
+        let is_bark = |face: &u32| parts.of[*face as usize] as usize >= parts.leaves;
+        let kept = (0..surface.faces.len() as u32).filter(is_bark).collect();
+        Levels {
+            cards: Cards::new(surface, parts),
+            widening: [1.0; OCTAVES],
+            bark: vec![BarkLevel { kept, ..BarkLevel::default() }],
+        }
+    }
+
+    /// The surface that is drawn of leaves at a share, with cards wider by a factor in area, and a level of bark.
+    pub fn surface(&self, surface: &Surface, share: f64, area: f64, bark: usize) -> Surface {
+        self.faces(surface, share, area, bark).0
+    }
+
+    /// The same, and which face of the whole surface each stands for.
+    pub fn faces(&self, surface: &Surface, share: f64, area: f64, bark: usize) -> (Surface, Vec<u32>) {
+        let (mut faces, mut like) = (Vec::new(), Vec::new());
+        for k in &self.cards.order {
+            let rank = f64::from(self.cards.rank[*k as usize]);
+            if card_weight(rank, share) > 0.0 {
+                let scale = card_scale(rank, share, area) as f32;
+                let (middle, face) = (self.cards.middle[*k as usize], &surface.faces[*k as usize]);
+                let moved = |p: Vec3| if share < 1.0 { middle + (p - middle) * scale } else { p };
+                faces.push(Face { p: face.p.map(moved), ..*face });
+                like.push(*k);
+            }
+        }
+        let level = &self.bark[bark];
+        faces.extend(level.kept.iter().map(|k| surface.faces[*k as usize]));
+        faces.extend(level.new.iter().map(|n| n.face(surface)));
+        like.extend(level.kept.iter().copied().chain(level.new.iter().map(|n| n.like)));
+        (Surface { frame: surface.frame, faces, masks: surface.masks.clone() }, like)
+    }
+
+    /// How many triangles that are not the model's own all levels of bark have together.
+    pub fn extra(&self) -> usize {
+        self.bark.iter().map(|b| b.new.len()).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests;
