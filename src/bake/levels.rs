@@ -5,11 +5,11 @@ pub(super) mod bark;
 mod cards;
 mod coverage;
 mod nearest;
+mod verify;
 
 pub use bark::{BarkLevel, NewFace};
 pub use cards::Cards;
-pub use coverage::DIRECTIONS;
-pub(crate) use coverage::{silhouette, spread};
+pub use verify::{Agreement, LevelQuality, Seen, verify};
 
 use glam::Vec3;
 
@@ -48,13 +48,9 @@ impl Levels {
         }
     }
 
-    /// The surface that is drawn of leaves at a share, with cards wider by a factor in area, and a level of bark.
-    pub fn surface(&self, surface: &Surface, share: f64, area: f64, bark: usize) -> Surface {
-        self.faces(surface, share, area, bark).0
-    }
-
-    /// The same, and which face of the whole surface each stands for.
-    pub fn faces(&self, surface: &Surface, share: f64, area: f64, bark: usize) -> (Surface, Vec<u32>) {
+    /// The surface that is drawn of leaves at a share, with cards wider by a factor in area, and a level of bark; and of which face of the whole surface each has the
+    /// surroundings.
+    pub fn surface(&self, surface: &Surface, share: f64, area: f64, bark: usize) -> (Surface, Vec<u32>) {
         let (mut faces, mut like) = (Vec::new(), Vec::new());
         for k in &self.cards.order {
             let rank = f64::from(self.cards.rank[*k as usize]);

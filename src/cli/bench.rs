@@ -123,7 +123,8 @@ pub fn run(args: &Args) -> Result<()> {
         return Err(Error::Usage(format!("--duration {} s is no time", args.duration)));
     }
     let start = Instant::now();
-    let (scene, camera) = args.scene.load()?;
+    let (mut scene, camera) = args.scene.load()?;
+    args.ladder.set(&mut scene);
     let load_s = start.elapsed().as_secs_f64();
     let path = match CameraPath::BUILTIN.iter().any(|b| b.0 == args.path) || !Path::new(&args.path).exists() {
         true => CameraPath::builtin(&args.path, &scene, &camera)?,

@@ -11,8 +11,8 @@ use crate::bake::surface::{Face, Mask, Surface};
 use crate::bake::{Baked, SpeciesBake};
 use crate::forest::species::mean_squared_scale;
 use crate::gpu::interface::{
-    BARK_LEVELS, BARK_PIXELS, FADE_BAND, HIDING_STEPS, LEAF_OCTAVES, LEAST_SHARE, MAX_SPECIES, MESH_TRIANGLES,
-    MeshFace, MeshKind, NO_PAGE,
+    BARK_LEVELS, BARK_PIXELS, FADE_BAND, HIDING_STEPS, LEAF_OCTAVES, LEAST_SHARE, MAX_SPECIES,
+    MESH_TRIANGLES, MeshFace, MeshKind, NO_PAGE,
 };
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
 use crate::physics::crown::Crown;
@@ -206,7 +206,8 @@ impl Content {
 
 /// A place in scaled tree space, 10 bits along each axis of the tree's box.
 fn packed(place: Vec3) -> u32 {
-    let [x, y, z] = ((place.clamp(Vec3::NEG_ONE, Vec3::ONE) * 0.5 + 0.5) * 1023.0).round().to_array().map(|c| c as u32);
+    let [x, y, z] =
+        ((place.clamp(Vec3::NEG_ONE, Vec3::ONE) * 0.5 + 0.5) * 1023.0).round().to_array().map(|c| c as u32);
     x | y << 10 | z << 20
 }
 

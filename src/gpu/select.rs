@@ -230,7 +230,8 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
             instance.get_physical_device_features2(p, &mut f);
             instance.get_physical_device_properties2(p, &mut props);
         }
-        let several = [f.features.multi_draw_indirect, f.features.draw_indirect_first_instance] == [vk::TRUE; 2];
+        let several =
+            [f.features.multi_draw_indirect, f.features.draw_indirect_first_instance] == [vk::TRUE; 2];
         pipeline_statistics = f.features.pipeline_statistics_query == vk::TRUE;
         vertex_layers = f12.shader_output_layer == vk::TRUE;
         counted_draws = several && f12.draw_indirect_count == vk::TRUE;

@@ -3,7 +3,9 @@
 use super::Plan;
 use super::items::Items;
 use super::names::resource;
-use crate::gpu::interface::{DrawCommand, HIDING_STEPS, MESH_DRAWS, MESH_TREES, MeshFace, MeshKind, MeshTree};
+use crate::gpu::interface::{
+    DrawCommand, HIDING_STEPS, MESH_DRAWS, MESH_TREES, MeshFace, MeshKind, MeshTree,
+};
 use crate::gpu::{BufferDesc, Description, ImageDesc, vk};
 use crate::physics::levels::BARK_LEVELS;
 use crate::scene::mesh::Triangle;
@@ -70,8 +72,12 @@ impl Plan {
         let [triangles, drawn] = most.fold([0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
         let corners = words(resource::MESH_CORNERS, 3 * triangles * CORNER_BYTES);
         let faces = words(resource::MESH_FACES, triangles * size_of::<MeshFace>() as u64);
-        let indices = BufferDesc { texels: Some(INDEX), ..BufferDesc::new(resource::MESH_INDICES, 3 * drawn * INDEX.1) };
-        let kinds = BufferDesc::new(resource::MESH_KINDS, (scene.species.len() * size_of::<MeshKind>()) as u64);
+        let indices = BufferDesc {
+            texels: Some(INDEX),
+            ..BufferDesc::new(resource::MESH_INDICES, 3 * drawn * INDEX.1)
+        };
+        let kinds =
+            BufferDesc::new(resource::MESH_KINDS, (scene.species.len() * size_of::<MeshKind>()) as u64);
         let reason = format!(
             "{} models and their levels of detail, whose triangles are drawn to {:.0} m",
             scene.species.len(),

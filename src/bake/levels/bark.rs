@@ -1,4 +1,8 @@
 //! Coarser bark: edge collapses by quadric errors (meshoptimizer), and how far the outcome really is from the whole.
+//!
+//! A quadric error tells how far places move off the surface. So twigs thinner than the error may go altogether, from end to end, and the plain distance of the whole
+//! bark from what is left is the length of a twig. What counts is what is seen: that a place moved, by its distance, or that a twig is gone, by
+//! half of how thick it was. The error of a level is the largest of either, over places of both surfaces.
 
 use std::collections::HashMap;
 
@@ -9,6 +13,7 @@ use rayon::prelude::*;
 use super::nearest::Nearest;
 use crate::bake::surface::{Face, Surface};
 use crate::physics::levels::BARK_LEVELS;
+use crate::rays::{Stack, Triangles};
 
 /// How far collapses may go, m: however far it takes. What the outcome may be used for, its error says.
 const LIMIT: f32 = 1e6;
@@ -20,7 +25,7 @@ pub struct BarkLevel {
     pub kept: Vec<u32>,
     /// Triangles of its own.
     pub new: Vec<NewFace>,
-    /// How far any place of it is from the whole bark, and of the whole bark from it, m; no less than of finer levels.
+    /// How far any place of it is from the whole bark, and any place of the whole bark from it or, where it is thinner, half of its thickness, m; no less than of finer levels.
     pub error: f64,
 }
 
@@ -111,8 +116,7 @@ impl Welded {
         }
         let bytes = bytemuck::cast_slice(&self.places);
         let places = VertexDataAdapter::new(bytes, size_of::<Vec3>(), 0).ok()?;
-        // Parts that hang together and are smaller than what others lose may go.
-        let options = SimplifyOptions::ErrorAbsolute | SimplifyOptions::Prune;
+        let options = SimplifyOptions::ErrorAbsolute;
         let found = meshopt::simplify(&self.indices, &places, 3 * most, LIMIT, options, None);
         if found.is_empty() || found.len() > 3 * most {
             return None;
@@ -121,7 +125,7 @@ impl Welded {
         let nearest = Nearest::new(&whole);
         let new = found.as_chunks::<3>().0.iter().map(|corners| {
             let middle = corners.iter().map(|c| self.places[*c as usize]).sum::<Vec3>() / 3.0;
-            let like = opaque[nearest.find(middle).1 as usize];
+            let like = opaque[nearest.find(middle, f32::INFINITY).1 as usize];
             NewFace { corners: corners.map(|c| self.corners[c as usize]), like }
         });
         Some(new.collect())
@@ -133,20 +137,30 @@ fn triangles(surface: &Surface, faces: &[u32]) -> Vec<[Vec3; 3]> {
     faces.iter().map(|k| surface.faces[*k as usize].p.map(|p| p * surface.frame.scale())).collect()
 }
 
-/// How far two surfaces are from each other, m: of corners, middles of edges and of triangles of either the largest distance from the other.
-fn error(surface: &Surface, whole: &[u32], new: &[NewFace]) -> f64 {
+/// What is lost between the whole and a level, m (see above): over corners and middles of edges of the level, and over places within triangles of the whole, from where a line
+/// straight inwards crosses the branch.
+pub(super) fn error(surface: &Surface, whole: &[u32], new: &[NewFace]) -> f64 {
     let whole = triangles(surface, whole);
     let new: Vec<[Vec3; 3]> =
         new.iter().map(|n| n.face(surface).p.map(|p| p * surface.frame.scale())).collect();
-    apart(&whole, &new).max(apart(&new, &whole))
+    let (to_whole, to_new) = (Nearest::new(&whole), Nearest::new(&new));
+    let moved = new.iter().flat_map(places).map(|p| to_whole.find(p, f32::INFINITY).0);
+    let (rays, mut stack) = (Triangles::new(&whole), Stack::new());
+    let lost = (0u32..).zip(&whole).flat_map(|(k, t)| within(t).map(|p| (k, t, p))).map(|(k, t, p)| {
+        let inwards = -(t[1] - t[0]).cross(t[2] - t[0]).normalize_or_zero();
+        let other = rays.nearest(p, inwards, f32::MAX, &mut stack, |face, _, _| face != k);
+        to_new.find(p, other.map_or(f32::INFINITY, |met| 0.5 * met.t)).0
+    });
+    f64::from(moved.chain(lost).fold(0.0, f32::max))
 }
 
-/// Largest distance of places of triangles from others.
-fn apart(of: &[[Vec3; 3]], from: &[[Vec3; 3]]) -> f64 {
-    let nearest = Nearest::new(from);
-    let places = |[a, b, c]: &[Vec3; 3]| {
-        [*a, *b, *c, (*a + *b) * 0.5, (*b + *c) * 0.5, (*c + *a) * 0.5, (*a + *b + *c) / 3.0]
-    };
-    let farthest = |t: &[Vec3; 3]| places(t).map(|p| nearest.find(p).0).into_iter().fold(0.0, f32::max);
-    f64::from(of.iter().map(farthest).fold(0.0, f32::max))
+/// Places within a triangle.
+fn within([a, b, c]: &[Vec3; 3]) -> [Vec3; 4] {
+    let middle = (*a + *b + *c) / 3.0;
+    [middle, (*a + middle) * 0.5, (*b + middle) * 0.5, (*c + middle) * 0.5]
+}
+
+/// Corners, middles of edges and the middle of a triangle.
+fn places([a, b, c]: &[Vec3; 3]) -> [Vec3; 7] {
+    [*a, *b, *c, (*a + *b) * 0.5, (*b + *c) * 0.5, (*c + *a) * 0.5, (*a + *b + *c) / 3.0]
 }

@@ -31,8 +31,10 @@ impl Cards {
         for (face, part) in parts.of.iter().enumerate().filter(|(_, part)| (**part as usize) < parts.leaves) {
             faces[*part as usize].push(face as u32);
         }
-        let areas: Vec<f64> =
-            faces.iter().map(|f| f.iter().map(|k| area(surface, &surface.faces[*k as usize])).sum()).collect();
+        let areas: Vec<f64> = faces
+            .iter()
+            .map(|f| f.iter().map(|k| area(surface, &surface.faces[*k as usize])).sum())
+            .collect();
         let all = areas.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let count = surface.faces.len();
         let mut cards = Cards {

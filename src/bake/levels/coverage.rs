@@ -10,18 +10,18 @@ use crate::physics::levels::OCTAVES;
 use crate::physics::views::Basis;
 
 /// Directions from which it is measured: of the upper hemisphere, because from the opposite side a tree covers the same.
-pub const DIRECTIONS: usize = 24;
+const DIRECTIONS: usize = 24;
 /// Texels along a side of a picture of it, each of 16 samples.
 const RESOLUTION: u32 = 64;
 /// Of the view that just holds the tree, how much wider a picture is: fewer cards, wider, reach out of the tree's box.
-const MARGIN: f32 = 1.5;
+pub(super) const MARGIN: f32 = 1.5;
 /// Steps towards the widening.
 const STEPS: usize = 3;
 /// Least and most of it.
-const BOUNDS: [f64; 2] = [0.5, 4.0];
+const BOUNDS: [f64; 2] = [0.1, 4.0];
 
 /// Directions over the upper hemisphere of equal solid angles (additive recurrence of the plane's golden ratio).
-pub(crate) fn spread(count: usize) -> Vec<DVec3> {
+pub(super) fn spread(count: usize) -> Vec<DVec3> {
     let of = |k: usize| {
         let k = k as f64 + 0.5;
         let z = (k * 0.754_877_666_246_692_7).fract();
@@ -33,7 +33,7 @@ pub(crate) fn spread(count: usize) -> Vec<DVec3> {
 }
 
 /// The nearest face that each sample of a picture of `resolution`² texels shows from a direction in scaled tree space.
-pub(crate) fn silhouette<'a>(
+pub(super) fn silhouette<'a>(
     surface: &Surface,
     towards: DVec3,
     resolution: u32,
@@ -66,7 +66,7 @@ pub(super) fn widening(surface: &Surface, levels: &Levels) -> [f64; OCTAVES] {
     let mut found = [1.0; OCTAVES];
     for octave in 1..OCTAVES {
         let share = 0.5f64.powi(octave as i32);
-        let at = |area: f64| ratio(&covered(&levels.surface(surface, share, area, 0)), &whole).ln();
+        let at = |area: f64| ratio(&covered(&levels.surface(surface, share, area, 0).0), &whole).ln();
         // The secant in logarithms: coverage grows about as the root of the area at first.
         let (mut before, mut now) = (found[octave - 1], found[octave - 1]);
         let mut error = [0.0, at(now)];
@@ -81,4 +81,10 @@ pub(super) fn widening(surface: &Surface, levels: &Levels) -> [f64; OCTAVES] {
         found[octave] = f64::from(now as f32);
     }
     found
+}
+
+/// Coverage of a surface over that of another, on average over the directions.
+#[cfg(test)]
+pub(super) fn of(whole: &Surface, surface: &Surface) -> f64 {
+    ratio(&covered(surface), &covered(whole))
 }

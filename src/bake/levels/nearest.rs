@@ -38,14 +38,14 @@ impl<'a> Nearest<'a> {
         Nearest { triangles, cells, side, low: cell(low), high: cell(high) }
     }
 
-    /// Distance of a place from the nearest triangle, and which that is.
-    pub fn find(&self, place: Vec3) -> (f32, u32) {
+    /// Distance of a place from the nearest triangle, and which that is; `within`, and any, where none is so near.
+    pub fn find(&self, place: Vec3, within: f32) -> (f32, u32) {
         let middle = (place / self.side).floor().as_ivec3();
         // Rings of cells that reach the box of all, from the inside out.
         let clamped = middle.clamp(self.low, self.high);
         let first = (middle - clamped).abs().max_element();
         let last = (middle - self.low).abs().max((middle - self.high).abs()).max_element();
-        let mut best = (f32::INFINITY, 0);
+        let mut best = (within, 0);
         for ring in first..=last {
             // What is in this ring is at least so far.
             if best.0 <= (ring - 1).max(0) as f32 * self.side {
@@ -113,8 +113,9 @@ mod tests {
         for _ in 0..400 {
             let p = point(16.0) - Vec3::splat(3.0);
             let all = triangles.iter().map(|t| distance(p, t)).fold(f32::INFINITY, f32::min);
-            let (found, k) = grid.find(p);
+            let (found, k) = grid.find(p, f32::INFINITY);
             assert_eq!((found, distance(p, &triangles[k as usize])), (all, all), "{p:?}");
+            assert_eq!(grid.find(p, 0.5).0, all.min(0.5), "{p:?}");
         }
         // On a corner, over the middle, beside an edge.
         let t = [Vec3::ZERO, Vec3::X, Vec3::Y];

@@ -5,7 +5,8 @@ use crate::forest::meshes::MeshData;
 use crate::frame::Forest;
 use crate::frame::targets::ImageTargets;
 use crate::gpu::interface::{
-    DrawCommand, HIDING_STEPS, MESH_DRAWS, MESH_TREES, MeshKind, MeshLightParameters, MeshParameters, TILE_SIDE,
+    DrawCommand, HIDING_STEPS, MESH_DRAWS, MESH_TREES, MeshKind, MeshLightParameters, MeshParameters,
+    TILE_SIDE,
 };
 use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, Later, Layers, Program, Recorder, Resource, Sampler,
