@@ -26,7 +26,7 @@ const uint MESH_TREES = 4096u;        // most trees in view that are meshes: 12 
 const uint MESH_TRIANGLES = 524288u;  // most triangles of a mesh: 19 bits of it
 const uint HIDING_STEPS = 16u;        // steps of height above the ground for which what trees hide of the sky is known
 const uint MESH_SEEN = 0x80000000u;   // of what a sample sees: a mesh's tree << 19 | triangle, not a quad of the ground
-const uint LEAF_OCTAVES = 7u;         // shares of the leaves at which the widening of their cards is known: 1, 1/2, 1/4 and so on
+const uint LEAF_OCTAVES = 7u;         // shares of the leaves at which the pull on their cards is known: 1, 1/2, 1/4 and so on
 const float LEAST_SHARE = 0.015625;   // the last of them
 const float FADE_BAND = 0.1;          // half the width of the band of ranks in which cards fade, over u (1 - u)
 const uint BARK_LEVELS = 6u;          // most levels of bark, the whole among them
@@ -235,7 +235,8 @@ struct MeshKind {
     uint first_leaf;                  // leaves in the shuffled order of their cards
     uint leaf_count;                  // triangles of them
     uint bark_levels;                 // levels of bark, the whole first
-    float widening[LEAF_OCTAVES];     // of cards, at shares of 1, 1/2, 1/4 and so on
+    vec3 leaf_middle;                 // of all leaves, m from the middle of the box
+    float pull[LEAF_OCTAVES];         // factor of how far cards are from there, at shares of 1, 1/2, 1/4 and so on
     uint first_bark[BARK_LEVELS];     // indices of each level
     uint bark_count[BARK_LEVELS];     // triangles of it
     float bark_error[BARK_LEVELS];    // how far it is from the whole bark, m
@@ -245,7 +246,7 @@ struct MeshKind {
 struct MeshTree {
     uint tree;                        // of the trees in view
     float share;                      // of its leaves
-    float area;                       // factor of a card's area
+    float pull;                       // factor of how far their cards are from the middle of all
     uint bark;                        // level
 };
 

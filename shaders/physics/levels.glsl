@@ -10,8 +10,8 @@ float leaf_share(float pixels, float least) {
 // Rank from which on cards are not drawn.
 float drawn_end(float share) { return share + FADE_BAND * share * (1.0 - share); }
 
-// Factor of the size of a card of a rank along each side, where area is multiplied by `area` (widening over share).
-float card_scale(float rank, float share, float area) {
+// Factor of the size of a card of a rank along each side.
+float card_scale(float rank, float share) {
     float weight = clamp((drawn_end(share) - rank) / max(2.0 * FADE_BAND * share * (1.0 - share), 1e-6), 0.0, 1.0);
-    return share < 1.0 ? sqrt(weight * area) : 1.0;
+    return share < 1.0 ? sqrt(weight / share) : 1.0;
 }

@@ -187,8 +187,7 @@ impl<'a> Source<'a> {
     /// [`crate::Error::Usage`] for a mesh without extent.
     pub fn load_levels(&self) -> Result<(Levels, CacheState)> {
         let surface = Surface::new(self.mesh)?;
-        let parts = Parts::new(self.mesh, &surface);
-        let whole = Levels::whole(&surface, &parts);
+        let whole = Levels::whole(self.mesh, &surface);
         let (holed, opaque) = bark::parted(&surface, &whole.bark[0].kept);
         // A level that there is not has no triangles.
         let sizes = (1..BARK_LEVELS).map(|level| size_of::<NewFace>() * bark::most(opaque.len(), level));
@@ -204,7 +203,7 @@ impl<'a> Source<'a> {
                     put(bytemuck::cast_slice(&new))
                 })
             },
-            || Ok(Levels::new(&surface, &parts)),
+            || Ok(Levels::new(self.mesh, &surface)),
             self.quiet,
         )
     }
@@ -287,9 +286,9 @@ fn levels_key(mesh: &Mesh) -> [u8; 32] {
     fields.key()
 }
 
-/// The widening of cards; of each level of bark its triangles and its error.
+/// The pull on cards; of each level of bark its triangles and its error.
 fn levels_head(levels: &Levels) -> Vec<u8> {
-    let mut head = bytes(&levels.widening);
+    let mut head = bytes(&levels.pull);
     for level in 0..BARK_LEVELS {
         let of = levels.bark.get(level).map_or((0, 0.0), |b| (b.new.len() as u32, b.error as f32));
         head.extend(of.0.to_le_bytes().into_iter().chain(of.1.to_le_bytes()));
@@ -299,8 +298,8 @@ fn levels_head(levels: &Levels) -> Vec<u8> {
 
 /// The levels of a file, whose leaves' order and whole bark follow from the mesh.
 fn decode_levels(read: &[Vec<u8>], whole: Levels, holed: &[u32]) -> Levels {
-    let widening = floats(&read[0][..4 * OCTAVES]);
-    let mut levels = Levels { widening: std::array::from_fn(|k| widening[k]), ..whole };
+    let pull = floats(&read[0][..4 * OCTAVES]);
+    let mut levels = Levels { pull: std::array::from_fn(|k| pull[k]), ..whole };
     for (level, part) in read.iter().enumerate().skip(1) {
         let [count, error] = [0, 4].map(|at| {
             let from = 4 * OCTAVES + 8 * level + at;

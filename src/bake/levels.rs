@@ -13,51 +13,49 @@ pub use verify::{Agreement, LevelQuality, Seen, verify};
 
 use glam::Vec3;
 
-use super::envelope::Parts;
 use super::surface::{Face, Surface};
 use crate::physics::levels::{OCTAVES, card_scale, card_weight};
+use crate::scene::Mesh;
 
 /// A species' levels of detail.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Levels {
     /// Its leaves.
     pub cards: Cards,
-    /// Factor of the area of cards on top of 1/u, at shares u of 1, 1/2, 1/4 and so on.
-    pub widening: [f64; OCTAVES],
+    /// Factor of how far cards are from the middle of all leaves, at shares u of 1, 1/2, 1/4 and so on.
+    pub pull: [f64; OCTAVES],
     /// Its bark, from the whole to the coarsest.
     pub bark: Vec<BarkLevel>,
 }
 
 impl Levels {
     /// Makes them; the same bits on any number of threads.
-    pub fn new(surface: &Surface, parts: &Parts) -> Self {
-        let mut levels = Levels::whole(surface, parts);
+    pub fn new(mesh: &Mesh, surface: &Surface) -> Self {
+        let mut levels = Levels::whole(mesh, surface);
         levels.bark.extend(bark::simplified(surface, &levels.bark[0].kept));
-        levels.widening = coverage::widening(surface, &levels);
+        levels.pull = coverage::pull(surface, &levels);
         levels
     }
 
     /// The leaves' order, and the whole bark alone.
-    pub(super) fn whole(surface: &Surface, parts: &Parts) -> Self {
-        let is_bark = |face: &u32| parts.of[*face as usize] as usize >= parts.leaves;
-        let kept = (0..surface.faces.len() as u32).filter(is_bark).collect();
-        Levels {
-            cards: Cards::new(surface, parts),
-            widening: [1.0; OCTAVES],
-            bark: vec![BarkLevel { kept, ..BarkLevel::default() }],
-        }
+    pub(super) fn whole(mesh: &Mesh, surface: &Surface) -> Self {
+        let cards = Cards::new(mesh, surface);
+        // Ranks of leaves are above 0.
+        let kept = (0u32..).zip(&cards.rank).filter(|(_, rank)| **rank == 0.0).map(|(k, _)| k).collect();
+        Levels { cards, pull: [1.0; OCTAVES], bark: vec![BarkLevel { kept, ..BarkLevel::default() }] }
     }
 
-    /// The surface that is drawn of leaves at a share, with cards wider by a factor in area, and a level of bark; and of which face of the whole surface each has the
+    /// The surface that is drawn of leaves at a share, pulled by a factor, and a level of bark; and of which face of the whole surface each has the
     /// surroundings.
-    pub fn surface(&self, surface: &Surface, share: f64, area: f64, bark: usize) -> (Surface, Vec<u32>) {
+    pub fn surface(&self, surface: &Surface, share: f64, pull: f64, bark: usize) -> (Surface, Vec<u32>) {
         let (mut faces, mut like) = (Vec::new(), Vec::new());
         for k in &self.cards.order {
             let rank = f64::from(self.cards.rank[*k as usize]);
             if card_weight(rank, share) > 0.0 {
-                let scale = card_scale(rank, share, area) as f32;
+                let scale = card_scale(rank, share) as f32;
                 let (middle, face) = (self.cards.middle[*k as usize], &surface.faces[*k as usize]);
-                let moved = |p: Vec3| if share < 1.0 { middle + (p - middle) * scale } else { p };
+                let to = self.cards.centre + (middle - self.cards.centre) * pull as f32;
+                let moved = |p: Vec3| if share < 1.0 { to + (p - middle) * scale } else { p };
                 faces.push(Face { p: face.p.map(moved), ..*face });
                 like.push(*k);
             }

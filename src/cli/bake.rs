@@ -116,8 +116,8 @@ struct AsMesh {
     seconds: f64,
     cards: usize,
     card_side_m: f64,
-    /// Factors of the area of cards on top of 1/u, for u = 1, 1/2, 1/4 and so on.
-    widening: Vec<f64>,
+    /// Factors of how far cards are from the middle of all leaves, for u = 1, 1/2, 1/4 and so on.
+    pull: Vec<f64>,
     /// Triangles and error, m, of each level of bark.
     bark: Vec<(usize, f64)>,
     /// With `--verify`.
@@ -307,7 +307,7 @@ fn as_mesh(
         seconds,
         cards: levels.cards.count,
         card_side_m: levels.cards.side,
-        widening: levels.widening.to_vec(),
+        pull: levels.pull.to_vec(),
         bark: levels.bark.iter().map(|b| (b.kept.len() + b.new.len(), b.error)).collect(),
         verify: verify.transpose()?.unwrap_or_default(),
     })
@@ -415,7 +415,7 @@ fn mesh_text(m: &AsMesh) -> String {
         "leaves",
         "tree, px",
         "triangles",
-        "card area",
+        "pull",
         "bark",
         "coverage",
         "worst",
@@ -434,7 +434,7 @@ fn mesh_text(m: &AsMesh) -> String {
             format!("{}", q.share),
             format!("{:.0}", q.height_px),
             q.leaf_triangles.to_string(),
-            format!("{:.3}", q.card_area),
+            format!("{:.3}", q.pull),
             format!("{}: {}", q.bark_level, q.bark_triangles),
             format!("{:.4}", q.mean.coverage),
             worst(|a| a.coverage),

@@ -164,7 +164,8 @@ impl Content {
             first_leaf: self.order(first_face, levels.cards.order.iter().copied()),
             leaf_count: levels.cards.order.len() as u32,
             bark_levels: levels.bark.len() as u32,
-            widening: levels.widening.map(|w| w as f32),
+            leaf_middle: (levels.cards.centre * surface.frame.scale()).to_array(),
+            pull: levels.pull.map(|w| w as f32),
             ..bytemuck::Zeroable::zeroed()
         };
         self.names += face_count;

@@ -14,12 +14,13 @@
 //! **The last cards fade**: around rank u, over [`FADE_BAND`] u (1 − u) to either side, a card's area falls from full to nothing. The mean over ranks is u, as
 //! without the band, and each card's size is a continuous function of the distance. At u = 1 there is no band, and all is whole.
 //!
-//! **Widening**: fewer and larger cards reach farther out of the crown and hide less of each other. Area over u is multiplied by what
-//! brings the mean coverage back to that of the whole model, which is measured at [`OCTAVES`] shares when a species is baked.
+//! **Pull**: larger cards reach farther out of the crown, which then covers more. So their middles are drawn towards the middle of all leaves, by a factor
+//! that brings the mean coverage back to that of the whole model; it is measured at [`OCTAVES`] shares when a species is baked. The leaves' area stays, and
+//! with it how deep one sees into the crown. (Less area in place of that would also cover as much: but then one sees deeper, to where it is darker.)
 //!
 //! **Bark** has levels of a simplifier, of which the coarsest is drawn whose distance from the whole bark is at most [`BARK_PIXELS`].
 
-/// Shares u at which the widening is known: 1, 1/2, 1/4 and so on.
+/// Shares u at which the pull is known: 1, 1/2, 1/4 and so on.
 pub const OCTAVES: usize = 7;
 /// The last of them, under which u never is.
 pub const LEAST_SHARE: f64 = 1.0 / 64.0;
@@ -48,16 +49,16 @@ pub fn card_weight(rank: f64, share: f64) -> f64 {
     ((drawn_end(share) - rank) / (2.0 * FADE_BAND * share * (1.0 - share))).clamp(0.0, 1.0)
 }
 
-/// The widening at a share, from those at octaves: linear in the octave.
-pub fn widening(octaves: &[f64; OCTAVES], share: f64) -> f64 {
+/// The pull at a share, from those at octaves: linear in the octave.
+pub fn pull(octaves: &[f64; OCTAVES], share: f64) -> f64 {
     let octave = (-share.log2()).clamp(0.0, (OCTAVES - 1) as f64);
     let k = (octave as usize).min(OCTAVES - 2);
     octaves[k] + (octaves[k + 1] - octaves[k]) * (octave - k as f64)
 }
 
 /// Factor of the size of a card of a rank, along each side.
-pub fn card_scale(rank: f64, share: f64, widening: f64) -> f64 {
-    if share >= 1.0 { 1.0 } else { (card_weight(rank, share) * widening / share).sqrt() }
+pub fn card_scale(rank: f64, share: f64) -> f64 {
+    if share >= 1.0 { 1.0 } else { (card_weight(rank, share) / share).sqrt() }
 }
 
 /// The level of bark for a tree of which a metre covers so many pixels, from the levels' distances from the whole bark in metres; trees
@@ -117,8 +118,8 @@ mod tests {
         assert_eq!([100.0, 50.0, 26.0, 25.0, 7.0, 6.0].map(level), [0, 1, 1, 2, 2, 3]);
         // Near trees are whole.
         assert_eq!(bark_level(errors, 1.0, 1.0), 0);
-        let octaves = [1.0, 1.1, 1.2, 1.4, 1.6, 2.0, 2.2];
-        assert_eq!([1.0, 0.5, LEAST_SHARE].map(|u| widening(&octaves, u)), [1.0, 1.1, 2.2]);
-        assert!((widening(&octaves, 0.125f64.sqrt()) - 1.15).abs() < 1e-12);
+        let octaves = [1.0, 0.9, 0.8, 0.7, 0.65, 0.6, 0.5];
+        assert_eq!([1.0, 0.5, LEAST_SHARE].map(|u| pull(&octaves, u)), [1.0, 0.9, 0.5]);
+        assert!((pull(&octaves, 0.125f64.sqrt()) - 0.85).abs() < 1e-12);
     }
 }

@@ -137,8 +137,8 @@ fn triangles(surface: &Surface, faces: &[u32]) -> Vec<[Vec3; 3]> {
     faces.iter().map(|k| surface.faces[*k as usize].p.map(|p| p * surface.frame.scale())).collect()
 }
 
-/// What is lost between the whole and a level, m (see above): over corners and middles of edges of the level, and over places within triangles of the whole, from where a line
-/// straight inwards crosses the branch.
+/// What is lost between the whole and a level, m (see above): over corners and middles of edges of the level, and over places within triangles of the whole, from where lines
+/// cross the branch.
 pub(super) fn error(surface: &Surface, whole: &[u32], new: &[NewFace]) -> f64 {
     let whole = triangles(surface, whole);
     let new: Vec<[Vec3; 3]> =
@@ -147,9 +147,18 @@ pub(super) fn error(surface: &Surface, whole: &[u32], new: &[NewFace]) -> f64 {
     let moved = new.iter().flat_map(places).map(|p| to_whole.find(p, f32::INFINITY).0);
     let (rays, mut stack) = (Triangles::new(&whole), Stack::new());
     let lost = (0u32..).zip(&whole).flat_map(|(k, t)| within(t).map(|p| (k, t, p))).map(|(k, t, p)| {
-        let inwards = -(t[1] - t[0]).cross(t[2] - t[0]).normalize_or_zero();
-        let other = rays.nearest(p, inwards, f32::MAX, &mut stack, |face, _, _| face != k);
-        to_new.find(p, other.map_or(f32::INFINITY, |met| 0.5 * met.t)).0
+        let normal = (t[1] - t[0]).cross(t[2] - t[0]).normalize_or_zero();
+        // To both sides, because not all models wind their faces alike; and at angles, because between a tube's rings are gaps, and its ends are open.
+        let ways = [normal, -normal].into_iter().flat_map(|side| {
+            let tilted = t.map(|corner| side + (corner - p).normalize_or_zero());
+            [side, tilted[0], tilted[1], tilted[2]]
+        });
+        let depth = |way: Vec3| {
+            let met = rays.nearest(p, way, f32::MAX, &mut stack, |face, _, _| face != k);
+            met.map_or(f32::INFINITY, |met| met.t * way.dot(normal).abs())
+        };
+        let thickness = ways.map(depth).fold(f32::INFINITY, f32::min);
+        to_new.find(p, 0.5 * thickness).0
     });
     f64::from(moved.chain(lost).fold(0.0, f32::max))
 }

@@ -2,14 +2,18 @@
 
 use glam::Vec3;
 
-use super::super::envelope::Parts;
-use super::super::surface::{Face, Surface};
+use crate::bake::envelope::leaves;
+use crate::bake::surface::{Face, Surface};
 use crate::physics::hash::Stream;
+use crate::scene::Mesh;
 
 /// Key of the shuffle.
 const SHUFFLE: u32 = 0x1eaf;
 
-/// Cards of leaves: faces of foliage that hang together ([`Parts`]; of what is larger than a leaf each face is its own).
+/// What hangs together is a card up to this radius, as a part of the tree's half width; of what is larger each face is its own.
+const LARGEST: f32 = 0.3;
+
+/// Cards of leaves: faces of foliage that hang together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cards {
     /// Faces that are leaves, card after card in the shuffled order, those of a card as in the model.
@@ -18,6 +22,8 @@ pub struct Cards {
     pub rank: Vec<f32>,
     /// Of every face the middle of its card by area, in scaled tree space. Of bark 0.
     pub middle: Vec<Vec3>,
+    /// Middle of all leaves by their area, in scaled tree space.
+    pub centre: Vec3,
     /// Cards.
     pub count: usize,
     /// Side of a square of a card's mean area, m.
@@ -26,10 +32,13 @@ pub struct Cards {
 
 impl Cards {
     /// Shuffles the leaves of a surface.
-    pub fn new(surface: &Surface, parts: &Parts) -> Self {
-        let mut faces = vec![Vec::new(); parts.leaves];
-        for (face, part) in parts.of.iter().enumerate().filter(|(_, part)| (**part as usize) < parts.leaves) {
-            faces[*part as usize].push(face as u32);
+    pub fn new(mesh: &Mesh, surface: &Surface) -> Self {
+        let (card_of, cards) = leaves(mesh, surface, LARGEST);
+        let mut faces = vec![Vec::new(); cards];
+        for (face, card) in (0u32..).zip(&card_of) {
+            if let Some(card) = card {
+                faces[*card as usize].push(face);
+            }
         }
         let areas: Vec<f64> = faces
             .iter()
@@ -37,25 +46,26 @@ impl Cards {
             .collect();
         let all = areas.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let count = surface.faces.len();
-        let mut cards = Cards {
+        let mut all_cards = Cards {
             order: Vec::new(),
             rank: vec![0.0; count],
             middle: vec![Vec3::ZERO; count],
-            count: parts.leaves,
-            side: (all / parts.leaves.max(1) as f64).sqrt(),
+            centre: middle(surface, &faces.concat()),
+            count: cards,
+            side: (all / cards.max(1) as f64).sqrt(),
         };
         let mut before = 0.0;
-        for card in shuffled(parts.leaves) {
+        for card in shuffled(cards) {
             let rank = (before + 0.5 * areas[card]) / all;
             before += areas[card];
             let middle = middle(surface, &faces[card]);
             for face in &faces[card] {
-                cards.rank[*face as usize] = rank as f32;
-                cards.middle[*face as usize] = middle;
+                all_cards.rank[*face as usize] = rank as f32;
+                all_cards.middle[*face as usize] = middle;
             }
-            cards.order.extend(&faces[card]);
+            all_cards.order.extend(&faces[card]);
         }
-        cards
+        all_cards
     }
 }
 

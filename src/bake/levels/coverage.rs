@@ -1,4 +1,4 @@
-//! How much of the picture a tree covers, and how wide fewer leaves must be to cover as much.
+//! How much of the picture a tree covers, and how near to its middle fewer and larger leaves must be to cover as much.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -15,10 +15,10 @@ const DIRECTIONS: usize = 24;
 const RESOLUTION: u32 = 64;
 /// Of the view that just holds the tree, how much wider a picture is: fewer cards, wider, reach out of the tree's box.
 pub(super) const MARGIN: f32 = 1.5;
-/// Steps towards the widening.
+/// Steps towards the pull.
 const STEPS: usize = 3;
 /// Least and most of it.
-const BOUNDS: [f64; 2] = [0.1, 4.0];
+const BOUNDS: [f64; 2] = [0.3, 1.3];
 
 /// Directions over the upper hemisphere of equal solid angles (additive recurrence of the plane's golden ratio).
 pub(super) fn spread(count: usize) -> Vec<DVec3> {
@@ -60,19 +60,22 @@ fn ratio(of: &[u32], whole: &[u32]) -> f64 {
     each.sum::<f64>() / whole.len() as f64
 }
 
-/// Factor of the area of cards at each octave of the share with which the tree covers as much as whole, on average over the directions.
-pub(super) fn widening(surface: &Surface, levels: &Levels) -> [f64; OCTAVES] {
+/// Factor of how far cards are from the middle of all leaves at each octave of the share with which the tree covers as much as whole, on average over the directions.
+pub(super) fn pull(surface: &Surface, levels: &Levels) -> [f64; OCTAVES] {
     let whole = covered(surface);
     let mut found = [1.0; OCTAVES];
+    if levels.cards.count == 0 {
+        return found;
+    }
     for octave in 1..OCTAVES {
         let share = 0.5f64.powi(octave as i32);
-        let at = |area: f64| ratio(&covered(&levels.surface(surface, share, area, 0).0), &whole).ln();
-        // The secant in logarithms: coverage grows about as the root of the area at first.
+        let at = |pull: f64| ratio(&covered(&levels.surface(surface, share, pull, 0).0), &whole).ln();
+        // The secant in logarithms: what a crown covers grows at most with the square of its width.
         let (mut before, mut now) = (found[octave - 1], found[octave - 1]);
         let mut error = [0.0, at(now)];
         for step in 0..STEPS {
-            let slope = if step == 0 { 0.6 } else { (error[1] - error[0]) / (now / before).ln() };
-            let slope = if slope.is_finite() { slope.clamp(0.2, 2.0) } else { 0.6 };
+            let slope = if step == 0 { 1.5 } else { (error[1] - error[0]) / (now / before).ln() };
+            let slope = if slope.is_finite() { slope.clamp(0.5, 3.0) } else { 1.5 };
             before = now;
             now = (now * (-error[1] / slope).exp()).clamp(BOUNDS[0], BOUNDS[1]);
             error = [error[1], if step + 1 < STEPS { at(now) } else { 0.0 }];
@@ -83,8 +86,8 @@ pub(super) fn widening(surface: &Surface, levels: &Levels) -> [f64; OCTAVES] {
     found
 }
 
-/// Coverage of a surface over that of another, on average over the directions.
 #[cfg(test)]
+/// Coverage of a surface over that of another, on average over the directions.
 pub(super) fn of(whole: &Surface, surface: &Surface) -> f64 {
     ratio(&covered(surface), &covered(whole))
 }

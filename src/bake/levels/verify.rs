@@ -10,7 +10,7 @@ use crate::bake::envelope::Envelopes;
 use crate::bake::raster::{NO_FACE, Raster, SUBSAMPLES};
 use crate::bake::surface::Surface;
 use crate::physics::leaf::{Directions, Leaf, Sun, hemisphere, scattering};
-use crate::physics::levels::{bark_level, widening};
+use crate::physics::levels::{bark_level, pull};
 use crate::physics::light::luminance;
 use crate::scene::Mesh;
 use crate::{Error, Result};
@@ -43,8 +43,8 @@ pub struct LevelQuality {
     pub height_px: f64,
     /// Triangles of leaves.
     pub leaf_triangles: usize,
-    /// Factor of the area of a card.
-    pub card_area: f64,
+    /// Factor of how far cards are from the middle of all leaves.
+    pub pull: f64,
     /// Level of bark, 0 the whole.
     pub bark_level: usize,
     /// Its triangles.
@@ -93,8 +93,8 @@ fn level(
     let metre = leaf_pixels.max(1.0) * share.sqrt() / levels.cards.side;
     let height = 2.0 * f64::from(surface.frame.half_height) * metre;
     let bark = bark_level(levels.bark.iter().map(|b| b.error), metre, share);
-    let area = widening(&levels.widening, share);
-    let (drawn, like) = levels.surface(surface, share, area, bark);
+    let pull = pull(&levels.pull, share);
+    let (drawn, like) = levels.surface(surface, share, pull, bark);
     let whole: Vec<u32> = (0..surface.faces.len() as u32).collect();
     let resolution = (f64::from(MARGIN) * height).clamp(16.0, MOST_PIXELS) as u32;
     let compare = |rasters: &mut [Raster; 2], towards: DVec3| {
@@ -118,7 +118,7 @@ fn level(
         share,
         height_px: height,
         leaf_triangles: drawn.faces.len() - bark_triangles,
-        card_area: area / share,
+        pull,
         bark_level: bark,
         bark_triangles,
         bark_error_m: levels.bark[bark].error,

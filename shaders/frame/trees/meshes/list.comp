@@ -38,11 +38,11 @@ MeshTree chosen(uint tree, uint species) {
     float share = leaf_share(kinds.items[species].card_side * metre, p.leaf_pixels);
     float octave = clamp(-log2(share), 0.0, float(LEAF_OCTAVES - 1u));
     uint k = min(uint(octave), LEAF_OCTAVES - 2u), bark = 0u;
-    float widening = mix(kinds.items[species].widening[k], kinds.items[species].widening[k + 1u], octave - float(k));
+    float pull = mix(kinds.items[species].pull[k], kinds.items[species].pull[k + 1u], octave - float(k));
     for (uint level = 1u; level < kinds.items[species].bark_levels; level++) {
         bark = share < 1.0 && kinds.items[species].bark_error[level] * metre <= BARK_PIXELS ? level : bark;
     }
-    return MeshTree(tree, share, widening / share, bark);
+    return MeshTree(tree, share, pull, bark);
 }
 
 // How many of a species' triangles of leaves, in the order of their cards, come before a rank.

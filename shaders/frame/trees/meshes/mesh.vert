@@ -27,7 +27,7 @@ void main() {
     MeshTree shown = mesh_trees.items[place];
     Tree t = fetch_tree(trees, shown.tree);
     uvec4 corner = texelFetch(corners, gl_VertexIndex), is = texelFetch(faces, int(face));
-    vec3 at = levelled(corner_place(corner), is, shown, kinds.items[t.species].half_box);
+    vec3 at = levelled(corner_place(corner), is, shown, kinds.items[t.species].half_box, kinds.items[t.species].leaf_middle);
     gl_Position = view.v.clip_from_world * vec4(world_from_model(t, at), 1.0);
     uv = corner_uv(corner);
     uint dither = uint(unit(hash(t.identity ^ HASH_DITHER)) * 1024.0);
