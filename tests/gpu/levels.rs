@@ -15,6 +15,8 @@ use canopy::plan::Plan;
 use canopy::scene::{Camera, Distribution, Scene, TreePosition};
 
 const SIZE: [u32; 2] = [160, 120];
+/// Of what tells levels of bark apart.
+const LARGE: [u32; 2] = [640, 480];
 const LADDER: &str = "mesh:16,zfield:4,shader-map";
 const DAY: &str = "[sun]\nazimuth = 210.0\nelevation = 35.0\nirradiance = 1.0\n[sky]\nradiance = 0.1";
 const NIGHT: &str = "[sky]\nradiance = 0.1";
@@ -46,15 +48,15 @@ fn bake(scene: &Scene) -> Vec<Baked> {
     all.into_iter().map(|(b, _)| b).collect()
 }
 
-fn renderer(gpu: &Gpu, scene: &Scene, camera: &Camera) -> Renderer {
-    let eye = Eye::new(camera, &scene.terrain, SIZE);
+fn renderer(gpu: &Gpu, scene: &Scene, camera: &Camera, size: [u32; 2]) -> Renderer {
+    let eye = Eye::new(camera, &scene.terrain, size);
     let plan =
         Plan::for_eye(scene, &eye, true, LADDER.parse::<canopy::ladder::Ladder>().unwrap(), Some(gpu.info()));
     Renderer::new(gpu, Arc::new(scene.clone()), plan.unwrap(), &bake(scene)).unwrap()
 }
 
 fn picture(gpu: &Gpu, scene: &Scene, camera: &Camera) -> Picture {
-    let mut renderer = renderer(gpu, scene, camera);
+    let mut renderer = renderer(gpu, scene, camera, SIZE);
     renderer.render(camera, 1.0).unwrap();
     renderer.picture().unwrap()
 }
@@ -82,12 +84,12 @@ fn the_device_draws_of_each_tree_what_the_law_says() {
             [190.0 + f64::from(k % 5) * 9.0, 20.0 + f64::from(k / 5) * 20.0, 0.7 + 0.1 * f64::from(k % 7)]
         })
         .collect();
-    let scene = with(&trees(&places, NIGHT), "leaf_pixels", 3.0);
+    let scene = with(&trees(&places, NIGHT), "leaf_pixels", 12.0);
     let camera = device::camera([200.0, 8.0, 3.0], [205.0, 120.0, 8.0]);
-    let mut renderer = renderer(&gpu, &scene, &camera);
+    let mut renderer = renderer(&gpu, &scene, &camera, LARGE);
     let report = renderer.render(&camera, 1.0).unwrap();
     let total = report.trees.meshes as usize;
-    let focal = Eye::new(&camera, &scene.terrain, SIZE).pixels_at_1m;
+    let focal = Eye::new(&camera, &scene.terrain, LARGE).pixels_at_1m;
     let near = renderer.forest().unwrap().near.as_ref().unwrap();
     let data = near.meshes.as_ref().unwrap();
     let kinds: Vec<MeshKind> = gpu.read(&data.kinds, 0, 2).unwrap();
@@ -107,7 +109,7 @@ fn the_device_draws_of_each_tree_what_the_law_says() {
         let distance = glam::Vec3::from(tree.centre).as_dvec3().length();
         distances.push([f64::from(tree.species), distance]);
         let metre = focal * f64::from(tree.scale) / distance;
-        let (share, leaves, level) = law(levels, metre, 3.0, &ranks);
+        let (share, leaves, level) = law(levels, metre, 12.0, &ranks);
         assert!((f64::from(t.share) / share - 1.0).abs() < 1e-4, "{share} {}", t.share);
         let pull = pull(&levels.pull, share);
         assert!((f64::from(t.pull) / pull - 1.0).abs() < 1e-4, "{pull} {}", t.pull);
