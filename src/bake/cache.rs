@@ -36,7 +36,7 @@ const VIEWS: Format = Format { magic: *b"CANOPYZF", version: 14, extension: "zfi
 const TRANSFER: Format = Format { magic: *b"CANOPYLT", version: 4, extension: "transfer" };
 const INDIRECT: Format = Format { magic: *b"CANOPYIL", version: 14, extension: "indirect" };
 const ENVELOPES: Format = Format { magic: *b"CANOPYLE", version: 5, extension: "envelopes" };
-const LEVELS: Format = Format { magic: *b"CANOPYLV", version: 1, extension: "levels" };
+const LEVELS: Format = Format { magic: *b"CANOPYLV", version: 2, extension: "levels" };
 /// Numbers at the head of a file of views.
 const SCALARS: usize = 23 + 4 * TERMS;
 

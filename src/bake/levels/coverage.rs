@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::Levels;
 use crate::bake::raster::{NO_FACE, Raster, View};
 use crate::bake::surface::Surface;
-use crate::physics::levels::OCTAVES;
+use crate::physics::levels::{OCTAVES, bark_level};
 use crate::physics::views::Basis;
 
 /// Directions from which it is measured: of the upper hemisphere, because from the opposite side a tree covers the same.
@@ -15,6 +15,8 @@ const DIRECTIONS: usize = 24;
 const RESOLUTION: u32 = 64;
 /// Of the view that just holds the tree, how much wider a picture is: fewer cards, wider, reach out of the tree's box.
 pub(super) const MARGIN: f32 = 1.5;
+/// Least side of a card, pixels, with whose size on the screen bark goes: what twigs no longer cover leaves have to. As the knob `leaf_pixels` has it at first.
+const TYPICAL_PIXELS: f64 = 6.0;
 /// Steps towards the pull.
 const STEPS: usize = 3;
 /// Least and most of it.
@@ -69,7 +71,9 @@ pub(super) fn pull(surface: &Surface, levels: &Levels) -> [f64; OCTAVES] {
     }
     for octave in 1..OCTAVES {
         let share = 0.5f64.powi(octave as i32);
-        let at = |pull: f64| ratio(&covered(&levels.surface(surface, share, pull, 0).0), &whole).ln();
+        let metre = TYPICAL_PIXELS * share.sqrt() / levels.cards.side;
+        let bark = bark_level(levels.bark.iter().map(|b| b.error), metre, share);
+        let at = |pull: f64| ratio(&covered(&levels.surface(surface, share, pull, bark).0), &whole).ln();
         // The secant in logarithms: what a crown covers grows at most with the square of its width.
         let (mut before, mut now) = (found[octave - 1], found[octave - 1]);
         let mut error = [0.0, at(now)];

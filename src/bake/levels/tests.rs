@@ -1,6 +1,6 @@
 use super::*;
 use crate::bake::envelope::Parts;
-use crate::physics::levels::pull;
+use crate::physics::levels::{bark_level, pull};
 use crate::scene::Mesh;
 use crate::scene::model::load_named;
 
@@ -41,8 +41,10 @@ fn the_order_is_a_permutation_of_whole_cards_and_levels_are_the_same_on_any_numb
     // Expected coverage: half of the cards, twice as large and pulled as measured, cover what all do.
     let (all, like) = one.surface(&surface, 1.0, 1.0, 0);
     assert_eq!((all.faces.len(), like.len()), (surface.faces.len(), surface.faces.len()));
-    for share in [0.5, 0.35, 0.25, 0.125, 0.0625] {
-        let ratio = coverage::of(&surface, &one.surface(&surface, share, pull(&one.pull, share), 0).0);
+    for share in [0.5f64, 0.35, 0.25, 0.125, 0.0625] {
+        let metre = 6.0 * share.sqrt() / one.cards.side;
+        let bark = bark_level(one.bark.iter().map(|b| b.error), metre, share);
+        let ratio = coverage::of(&surface, &one.surface(&surface, share, pull(&one.pull, share), bark).0);
         // The secant ends within 0.3 %; between octaves the pull is a chord of a curve whose slope changes by a tenth: 0.4 % more.
         assert!((ratio - 1.0).abs() < 0.008, "{share}: {ratio}");
     }
@@ -61,20 +63,9 @@ fn the_order_is_a_permutation_of_whole_cards_and_levels_are_the_same_on_any_numb
         growth[leaves - 1]
     );
     assert!(growth.windows(2).all(|w| w[1] < w[0] + 1e-3));
-    println!("{} cards, {:.3?}", one.cards.count, one.pull);
-    for b in &one.bark {
-        println!("{} {} {}", b.kept.len(), b.new.len(), b.error);
-    }
-    let path = format!("{}/tests/data/pine.glb", env!("CARGO_MANIFEST_DIR"));
-    let pine = load_named(std::path::Path::new(&path), None).unwrap();
-    let bark = Levels::whole(&pine, &Surface::new(&pine).unwrap()).bark;
-    for b in bark::simplified(&Surface::new(&pine).unwrap(), &bark[0].kept) {
-        println!("pine {} {}", b.new.len(), b.error);
-    }
     let (_, opaque) = bark::parted(&surface, &one.bark[0].kept);
     for (k, level) in one.bark.iter().enumerate().skip(1) {
         assert!(level.new.len() <= bark::most(opaque.len(), k), "{k}");
-        println!("{}", level.error);
         assert!(bark::error(&surface, &opaque, &level.new) <= level.error, "{k}");
         assert!(level.error >= one.bark[k - 1].error, "{k}");
         // Twigs of an oak are thinner than that, and its trunk is not: half of the triangles are within 5 cm, a quarter within 10 cm.
