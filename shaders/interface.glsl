@@ -27,6 +27,12 @@ const uint MESH_TRIANGLES = 524288u;  // most triangles of a mesh: 19 bits of it
 const uint HIDING_STEPS = 16u;        // steps of height above the ground for which what trees hide of the sky is known
 const uint TREE_SPECIES = 15u;        // of a tree's word of species: its index; the rest is its sway in the wind (physics/wind.glsl), in its own axes
 const uint MESH_SEEN = 0x80000000u;   // of what a sample sees: a mesh's tree << 19 | triangle, not a quad of the ground
+const uint LEAF_OCTAVES = 7u;         // shares of the leaves at which the pull on their cards is known: 1, 1/2, 1/4 and so on
+const float LEAST_SHARE = 0.015625;   // the last of them
+const float FADE_BAND = 0.1;          // half the width of the band of ranks in which cards fade, over u (1 - u)
+const uint BARK_LEVELS = 6u;          // most levels of bark, the whole among them
+const float BARK_PIXELS = 0.5;        // farthest that a drawn level may be from the whole bark, pixels
+const uint MESH_DRAWS = 2u;           // draws of a tree that is a mesh: all of it or its leaves; its bark
 const uint COVER_SCRATCH = 16u;       // coverage tiles of one scratch word a texel that the scratch buffer holds
 const float FADE_FIRST = 0.9;         // part of its range at which the first of a species' trees has faded out
 const float FADE_SPREAD = 0.1;        // and how much later the last has, each at a time of its own
@@ -223,21 +229,40 @@ struct CasterQuad {
     uint wind_phases;                 // as in SeedQuad
 };
 
-// A draw of a species' mesh, without indices, and where its trees and triangles are.
-struct MeshDraw {
-    uint vertex_count;                // corners
-    uint instance_count;              // trees
-    uint first_vertex;                // first corner
-    uint first_instance;              // 0
-    uint first_tree;                  // in the list of trees that are meshes
+// A species' model as a mesh: where its triangles and their indices are, and what is drawn of them at which size (physics/levels.glsl).
+struct MeshKind {
+    vec3 half_box;                    // half extents of the tree's box, m
+    float card_side;                  // of a square of a leaf card's mean area, m
+    uint tree_count;                  // trees in view that are meshes: each frame's
+    uint first_tree;                  // in the list of trees that are meshes: each frame's
     uint first_face;                  // of all meshes' triangles
-    uint face_count;                  // triangles
+    uint face_count;                  // triangles of the whole model, in their own order
+    uint first_name;                  // of its triangles' random numbers, which levels have no part in
+    uint first_whole;                 // of all meshes' indices: those of the whole model
+    uint first_leaf;                  // leaves in the shuffled order of their cards
+    uint leaf_count;                  // triangles of them
+    uint bark_levels;                 // levels of bark, the whole first
+    vec3 leaf_middle;                 // of all leaves, m from the middle of the box
+    float pull[LEAF_OCTAVES];         // factor of how far cards are from there, at shares of 1, 1/2, 1/4 and so on
+    uint first_bark[BARK_LEVELS];     // indices of each level
+    uint bark_count[BARK_LEVELS];     // triangles of it
+    float bark_error[BARK_LEVELS];    // how far it is from the whole bark, m
+};
+
+// A tree that is a mesh, and what of it is drawn.
+struct MeshTree {
+    uint tree;                        // of the trees in view
+    float share;                      // of its leaves
+    float pull;                       // factor of how far their cards are from the middle of all
+    uint bark;                        // level
 };
 
 // What finding the trees that are meshes takes.
 struct MeshParameters {
     uint bins;                        // distance bins that can have some
     uint species_count;               // of the scene
+    float leaf_pixels;                // least side of a card on the screen; 0: meshes are always whole
+    uint named;                       // 1: draws name their trees; 0: whoever records them does
 };
 
 // What lighting meshes takes.
@@ -250,8 +275,8 @@ struct MeshLightParameters {
 struct MeshFace {
     uint mask;                        // layer of the array of masks; NO_PAGE: no holes
     uint foliage;                     // bit 0: a leaf, else bark; bit 1: it turns in the wind, about an axis of two bytes << 16
-    uint spare;                       // a texel has four words
-    uint middle;                      // of a leaf that turns, in the tree's box, 10 bits an axis
+    float rank;                       // of its card of leaves in their shuffled order: share of their area before the card's middle
+    uint middle;                      // of the card, or of the leaf that turns, in the tree's box, 10 bits an axis
 };
 
 // A tree that casts.

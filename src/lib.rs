@@ -53,6 +53,7 @@
 //! | the scene file | [`scene`] | | `tests/scene_inputs.rs`, `tests/model_inputs.rs` |
 //! | conformance of a driver | [`measure::conform`] | `probe/*` | `tests/conform.rs`, `tests/conformance/`, `tests/proofs/planted.rs` |
 //! | bakes on disk | [`bake::cache`], [`bake::tables`] | | `tests/cache.rs`, `tests/tables.rs` |
+//! | how much of a mesh is drawn at which size: Cook et al. 2007 for leaves, simplified bark | [`physics::levels`], [`bake::levels`] | `physics/levels.glsl`, `frame/trees/meshes/{list.comp, level.glsl}` | `tests/gpu/levels.rs` |
 //! | what stands for a tree at which distance | [`ladder`], [`physics::handover`] | `physics/handover.glsl` | `tests/gpu/plan.rs`, `tests/cli.rs` |
 //! | what a scene requires | [`plan`] | | `tests/gpu/plan.rs` |
 //! | the whole frame: extremes, paths through them, the same bits again | [`frame`] | `frame/*` | `tests/gpu/extremes.rs`, `tests/gpu/paths.rs`, `tests/gpu/determinism.rs` |

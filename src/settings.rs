@@ -84,6 +84,7 @@ knobs! {
     occlusion_rays: u32, "", 8..=1024, [32, 64, 128], bake [16, 32, 64, 128, 256], "rays a cell for baked ambient occlusion; bake time";
     samples: u32, "", 1..=8, [4, 4, 8], draw [1, 4, 8], "samples a pixel (1, 4 or 8, as far as the device goes): levels of opacity; fill cost";
     mesh_min_pixels: f32, "px", 16.0..=65536.0, [384.0, 256.0, 192.0], draw [], "apparent tree height under which trees are no longer their models' meshes, where the ladder has that rung; cost grows with its inverse square";
+    leaf_pixels: f32, "px", 0.0..=256.0, [8.0, 6.0, 4.0], draw [12.0, 8.0, 6.0, 4.0, 0.0], "least side of a card of leaves on the screen: meshes whose cards would be smaller have fewer and larger ones, and coarser bark (0: meshes are always whole); cost of far meshes falls with its inverse square";
     leaf_directions: u32, "", 8..=26, [14, 26, 26], bake [], "directions (8, 14 or 26) in which a leaf of a mesh knows the crown around it (BBP08: 8); memory, and time a pixel of mesh, grow in proportion";
     indirect: u32, "", 0..=1, [0, 1, 1], bake [0, 1], "1: light that met more than one surface counts, what leaves, bark and ground hand to each other (10 to 30 % of all); 0: it is left out; bake time";
     zfield_min_pixels: f32, "px", 0.25..=64.0, [6.0, 4.0, 3.0], draw [8.0, 6.0, 4.0, 3.0, 2.0, 1.5], "apparent tree height under which trees are no longer drawn one by one; cost grows with its inverse square";

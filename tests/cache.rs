@@ -219,7 +219,7 @@ fn of_scene(scene: &Scene, needs: Needs, dir: &Path) -> (Baked, BakedFrom) {
 }
 
 fn from(views: CacheState, transfer: Option<CacheState>, tables: CacheState) -> BakedFrom {
-    BakedFrom { views, transfer, tables, envelopes: None, indirect: None }
+    BakedFrom { views, transfer, tables, envelopes: None, levels: None, indirect: None }
 }
 
 /// Baked once with all.

@@ -5,6 +5,7 @@
 //! - `.transfer`, the light transfer of the views: of these and of the number of bands, whose coefficients are fitted together.
 //! - `.indirect`, light that met more than one surface ([`super::indirect`]): of a forest, its
 //!   models, their reflectances and densities, and the ground.
+//! - `.levels`, coarser meshes ([`super::levels`]): of the model.
 //! - `.envelopes`, the crown around each leaf ([`super::envelope`]): of the model and of the number of directions.
 //! - `.forest`, the tables of far forests ([`super::tables`]): of both.
 
@@ -14,6 +15,7 @@ use super::envelope::{Envelopes, Parts, RAYS};
 use super::file::{Fields, Format, load_or_build};
 use super::hiding::HEIGHTS;
 use super::indirect::{self, Mix};
+use super::levels::{BarkLevel, Levels, NewFace, bark};
 use super::surface::Surface;
 use super::{
     BakeSettings, ForestSettings, SpeciesBake, Turned, bake_transfer, bake_views, check, load_or_measure,
@@ -23,6 +25,7 @@ use crate::physics::correction::{Correction, TERMS};
 use crate::physics::crown::{Crown, Frame};
 use crate::physics::indirect::{COEFFICIENTS, Indirect};
 use crate::physics::leaf::Directions;
+use crate::physics::levels::{BARK_LEVELS, OCTAVES};
 use crate::physics::tables::ForestTables;
 use crate::physics::transfer::Transfer;
 use crate::physics::views;
@@ -33,6 +36,7 @@ const VIEWS: Format = Format { magic: *b"CANOPYZF", version: 14, extension: "zfi
 const TRANSFER: Format = Format { magic: *b"CANOPYLT", version: 4, extension: "transfer" };
 const INDIRECT: Format = Format { magic: *b"CANOPYIL", version: 14, extension: "indirect" };
 const ENVELOPES: Format = Format { magic: *b"CANOPYLE", version: 5, extension: "envelopes" };
+const LEVELS: Format = Format { magic: *b"CANOPYLV", version: 2, extension: "levels" };
 /// Numbers at the head of a file of views.
 const SCALARS: usize = 23 + 4 * TERMS;
 
@@ -177,6 +181,33 @@ impl<'a> Source<'a> {
         )
     }
 
+    /// Its mesh's levels of detail, likewise.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] for a mesh without extent.
+    pub fn load_levels(&self) -> Result<(Levels, CacheState)> {
+        let surface = Surface::new(self.mesh)?;
+        let whole = Levels::whole(self.mesh, &surface);
+        let (holed, opaque) = bark::parted(&surface, &whole.bark[0].kept);
+        // A level that there is not has no triangles.
+        let sizes = (1..BARK_LEVELS).map(|level| size_of::<NewFace>() * bark::most(opaque.len(), level));
+        load_or_build(
+            (self.dir, &LEVELS, &levels_key(self.mesh)),
+            &std::iter::once(4 * OCTAVES + 8 * BARK_LEVELS).chain(sizes).collect::<Vec<_>>(),
+            |read| decode_levels(&read, whole.clone(), &holed),
+            |built, put| {
+                put(&levels_head(built))?;
+                (1..BARK_LEVELS).try_for_each(|level| {
+                    let mut new = built.bark.get(level).map_or_else(Vec::new, |b| b.new.clone());
+                    new.resize(bark::most(opaque.len(), level), NewFace::default());
+                    put(bytemuck::cast_slice(&new))
+                })
+            },
+            || Ok(Levels::new(self.mesh, &surface)),
+            self.quiet,
+        )
+    }
+
     /// The tables of a forest of the species, likewise. Light transfer has a part in them: where they have to be measured, the
     /// bake gets its own first, if it has none, and `transfer` says from where.
     ///
@@ -249,6 +280,44 @@ fn envelopes_key(mesh: &Mesh, directions: u32) -> [u8; 32] {
     }
     put_mesh(&mut fields, mesh);
     fields.key()
+}
+
+/// BLAKE3 of everything that a mesh's levels of detail depend on.
+fn levels_key(mesh: &Mesh) -> [u8; 32] {
+    let mut fields = Fields::new("canopy mesh levels");
+    fields.put(&LEVELS.version.to_le_bytes());
+    put_mesh(&mut fields, mesh);
+    fields.key()
+}
+
+/// The pull on cards; of each level of bark its triangles and its error.
+fn levels_head(levels: &Levels) -> Vec<u8> {
+    let mut head = bytes(&levels.pull);
+    for level in 0..BARK_LEVELS {
+        let of = levels.bark.get(level).map_or((0, 0.0), |b| (b.new.len() as u32, b.error as f32));
+        head.extend(of.0.to_le_bytes().into_iter().chain(of.1.to_le_bytes()));
+    }
+    head
+}
+
+/// The levels of a file, whose leaves' order and whole bark follow from the mesh.
+fn decode_levels(read: &[Vec<u8>], whole: Levels, holed: &[u32]) -> Levels {
+    let pull = floats(&read[0][..4 * OCTAVES]);
+    let mut levels = Levels { pull: std::array::from_fn(|k| pull[k]), ..whole };
+    for (level, part) in read.iter().enumerate().skip(1) {
+        let [count, error] = [0, 4].map(|at| {
+            let from = 4 * OCTAVES + 8 * level + at;
+            std::array::from_fn::<u8, 4, _>(|k| read[0][from + k])
+        });
+        let count = (u32::from_le_bytes(count) as usize).min(part.len() / size_of::<NewFace>());
+        if count == 0 {
+            break;
+        }
+        let new = bytemuck::pod_collect_to_vec(&part[..count * size_of::<NewFace>()]);
+        let error = f64::from(f32::from_le_bytes(error));
+        levels.bark.push(BarkLevel { kept: holed.to_vec(), new, error });
+    }
+    levels
 }
 
 /// Light that met more than one surface, of a species of a forest, from the cache if it is there, else measured and put there.

@@ -97,7 +97,7 @@ impl Envelopes {
 impl Parts {
     /// Faces of foliage that share a corner are one leaf. Without foliage all faces stand for leaves.
     pub fn new(mesh: &Mesh, surface: &Surface) -> Self {
-        let (leaf_of, leaves) = leaves(mesh, surface);
+        let (leaf_of, leaves) = leaves(mesh, surface, LARGEST);
         let side = LARGEST * surface.frame.half_width;
         let (mut cells, mut count) = (std::collections::HashMap::new(), leaves as u32);
         let mut cell = |face: &Face| {
@@ -113,8 +113,9 @@ impl Parts {
     }
 }
 
-/// Leaf of every face, and how many there are: faces that share a corner are one. Without foliage all faces stand for leaves.
-fn leaves(mesh: &Mesh, surface: &Surface) -> (Vec<Option<u32>>, usize) {
+/// Leaf of every face, and how many there are: faces that share a corner are one, up to a radius as a part of the tree's half width. Without foliage all faces stand for
+/// leaves.
+pub(super) fn leaves(mesh: &Mesh, surface: &Surface, largest: f32) -> (Vec<Option<u32>>, usize) {
     let any = surface.faces.iter().any(|f| mesh.materials[f.material as usize].foliage);
     let is_leaf = |f: &Face| !any || mesh.materials[f.material as usize].foliage;
     let roots = joined(surface, is_leaf);
@@ -125,7 +126,7 @@ fn leaves(mesh: &Mesh, surface: &Surface) -> (Vec<Option<u32>>, usize) {
     }
     let large = |root: u32| {
         let (low, high) = bounds[root as usize];
-        0.5 * ((high - low) * surface.frame.scale()).length() > LARGEST * surface.frame.half_width
+        0.5 * ((high - low) * surface.frame.scale()).length() > largest * surface.frame.half_width
     };
     let (mut names, mut count) = (std::collections::HashMap::new(), 0u32);
     let mut name = |key: u32| {

@@ -10,6 +10,7 @@ pub(crate) mod grove;
 pub mod hiding;
 pub mod indirect;
 mod least_squares;
+pub mod levels;
 pub(crate) mod occlusion;
 pub(crate) mod optics;
 mod raster;

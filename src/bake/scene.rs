@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::envelope::Envelopes;
 use super::indirect::{Kind, Mix};
+use super::levels::Levels;
 use super::{CacheState, ForestSettings, Source, SpeciesBake, cache};
 use crate::Result;
 use crate::ladder::Ladder;
@@ -22,6 +23,8 @@ pub struct Baked {
     pub tables: Arc<ForestTables>,
     /// The crown around its leaves, where it is drawn as a mesh.
     pub envelopes: Option<Arc<Envelopes>>,
+    /// Its mesh's levels of detail, likewise.
+    pub levels: Option<Arc<Levels>>,
     /// Light that met more than one surface in the scene's forest, where it counts.
     pub indirect: Option<Arc<Indirect>>,
 }
@@ -37,6 +40,8 @@ pub struct BakedFrom {
     pub tables: CacheState,
     /// The crown around its leaves; `None` where nothing needed it.
     pub envelopes: Option<CacheState>,
+    /// Its mesh's levels of detail; likewise.
+    pub levels: Option<CacheState>,
     /// Light that met more than one surface; `None` where it is left out.
     pub indirect: Option<CacheState>,
 }
@@ -51,7 +56,7 @@ pub struct Needs {
     /// The light transfer of the views, to draw trees one by one. Measuring tables needs it as well and gets it by itself; once
     /// they are in the cache, a plan without z-fields or without a sun does without.
     pub transfer: bool,
-    /// The crown around each leaf, to draw trees as meshes.
+    /// The crown around each leaf and the levels of detail, to draw trees as meshes.
     pub envelopes: bool,
     /// Light that met more than one surface, where the settings ask for it.
     pub indirect: bool,
@@ -128,14 +133,16 @@ pub fn load_or_bake_scene(
             source.load_tables(&forest_settings(scene, k), &mut species, &mut transfer)?;
         let around = || source.load_envelopes(scene.settings.leaf_directions);
         let around = needs.envelopes.then(around).transpose()?;
-        let envelopes = around.as_ref().map(|a| a.1);
+        let coarser = needs.envelopes.then(|| source.load_levels()).transpose()?;
+        let (envelopes, levels) = (around.as_ref().map(|a| a.1), coarser.as_ref().map(|l| l.1));
         let one = Baked {
             species: Arc::new(species),
             tables: Arc::new(measured),
             envelopes: around.map(|a| Arc::new(a.0)),
+            levels: coarser.map(|l| Arc::new(l.0)),
             indirect: None,
         };
-        all.push((one, BakedFrom { views, transfer, tables, envelopes, indirect: None }));
+        all.push((one, BakedFrom { views, transfer, tables, envelopes, levels, indirect: None }));
     }
     if needs.trees && needs.indirect && scene.settings.indirect > 0 {
         load_indirect_light(scene, (&mut all, &keys), dir, quiet)?;

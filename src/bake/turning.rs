@@ -27,10 +27,15 @@ impl Turning {
             |here: f32, other: f32| if a.z < 0.0 { (1.0 - other.abs()) * 1f32.copysign(here) } else { here };
         let byte = |v: f32| u32::from((v * 127.0).round() as i8 as u8);
         let [u, v] = [fold(a.x, a.y), fold(a.y, a.x)].map(byte);
-        let step = |v: f32| ((0.5 + 0.5 * v.clamp(-1.0, 1.0)) * STEPS).round() as u32;
-        let [x, y, z] = self.middle.to_array().map(step);
-        [2 | u << 16 | v << 24, x | y << 10 | z << 20]
+        [2 | u << 16 | v << 24, packed_place(self.middle)]
     }
+}
+
+/// A place of scaled tree space, 10 bits along each axis of the tree's box.
+pub fn packed_place(place: Vec3) -> u32 {
+    let step = |v: f32| ((0.5 + 0.5 * v.clamp(-1.0, 1.0)) * STEPS).round() as u32;
+    let [x, y, z] = place.to_array().map(step);
+    x | y << 10 | z << 20
 }
 
 /// How each face turns with the leaf that it is of: all that hang together. `None` for what does not: bark, and what is larger than a leaf.

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use canopy::Result;
+use canopy::bake::levels::{LevelQuality, Seen};
 use canopy::bake::tables::{self, ForestSettings};
-use canopy::bake::{self, BakeSettings, CacheState, Source, SpeciesBake, cache};
+use canopy::bake::{self, BakeSettings, CacheState, Needs, Source, SpeciesBake, cache};
 use canopy::scene::{Mesh, OpticsOverride};
 use canopy::settings::Settings;
 
@@ -21,10 +22,14 @@ Examples:
   canopy bake oak.glb --verify 64           how well the z-field stands for the mesh
   canopy bake oak.glb --verify 64 --min-iou 0.8   and exit code 1 if it is worse than that
   canopy bake oak.glb --set view_rings=6    with fewer views
+  canopy bake my.toml --ahead               and all else that drawing it takes, meshes too: nothing is baked on first use
   canopy bake oak.glb --forest 0.03         and the tables of a far forest of 0.03 trees per m²
-Bakes are kept in $CANOPY_CACHE, else $XDG_CACHE_HOME/canopy, else ~/.cache/canopy: views (.zfield), light transfer (.transfer)
-and tables (.forest) apart. Of each it is said whether it was read from there (hit), baked, or baked again because the file
+Bakes are kept in $CANOPY_CACHE, else $XDG_CACHE_HOME/canopy, else ~/.cache/canopy: views (.zfield), light transfer (.transfer), crowns
+around leaves (.envelopes), levels of detail (.levels), light of all orders (.indirect) and tables (.forest) apart. Of each it is said whether it was read from there (hit), baked, or baked again because the file
 was damaged (rebuilt).";
+
+/// Directions from which levels of detail are compared, at least.
+const LEAST_DIRECTIONS: u32 = 24;
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{}", knobs_help()))]
@@ -34,7 +39,11 @@ pub struct Args {
     /// Height of an unscaled tree, m; left out: as modelled
     #[arg(long, value_name = "METRES")]
     height: Option<f64>,
-    /// Compare the bake with its mesh from N directions between the stored views
+    /// Make what drawing would make on first use as well: of a model what meshes take (the crowns around its leaves, its levels of detail), of a
+    /// scene's species also their tables and light of all orders
+    #[arg(long)]
+    ahead: bool,
+    /// Compare the bake with its mesh from N directions between the stored views, and the mesh's levels of detail with the whole
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     verify: Option<u32>,
     /// Exit with code 1 if the worst of these directions agrees less (IoU of the silhouettes, after the most iterations)
@@ -98,6 +107,30 @@ struct Forest {
     samples: Vec<[f64; 3]>,
 }
 
+/// What drawing a species as a mesh takes.
+#[derive(serde::Serialize)]
+struct AsMesh {
+    directions: u32,
+    envelopes: &'static str,
+    levels: &'static str,
+    seconds: f64,
+    cards: usize,
+    card_side_m: f64,
+    /// Factors of how far cards are from the middle of all leaves, for u = 1, 1/2, 1/4 and so on.
+    pull: Vec<f64>,
+    /// Triangles and error, m, of each level of bark.
+    bark: Vec<(usize, f64)>,
+    /// With `--verify`.
+    verify: Vec<LevelQuality>,
+}
+
+/// Where from the rest came that a scene's species are drawn with.
+#[derive(serde::Serialize)]
+struct Ahead {
+    tables: &'static str,
+    indirect: Option<&'static str>,
+}
+
 #[derive(serde::Serialize)]
 struct Baked {
     name: String,
@@ -114,6 +147,8 @@ struct Baked {
     optics: Optics,
     verify: Vec<Quality>,
     forest: Option<Forest>,
+    mesh: Option<AsMesh>,
+    ahead: Option<Ahead>,
 }
 
 #[derive(serde::Serialize)]
@@ -130,6 +165,15 @@ pub fn run(args: &Args) -> Result<()> {
         args.quality.set(&mut scene.settings)?;
         for s in &scene.species {
             species.push(one(args, s.name.clone(), (&s.mesh, &s.optics, s.scale), &scene.settings)?);
+        }
+        if args.ahead {
+            let needs = Needs { envelopes: true, ..Needs::ALL };
+            let all =
+                bake::load_or_bake_scene(&scene, needs, cache::default_dir().as_deref(), args.print.quiet)?;
+            for (s, (_, from)) in species.iter_mut().zip(&all) {
+                s.ahead =
+                    Some(Ahead { tables: from.tables.name(), indirect: from.indirect.map(CacheState::name) });
+            }
         }
     } else {
         let settings = args.quality.settings()?;
@@ -180,6 +224,8 @@ fn one(
     let tables =
         |density| forest(&source, (&mut bake, state), ForestSettings::new(settings, density, scale, false));
     let forest = args.forest.map(tables).transpose()?;
+    let mesh_too = args.ahead || args.verify.is_some();
+    let as_mesh = mesh_too.then(|| as_mesh(args, &source, (mesh, &bake), settings)).transpose()?;
     Ok(Baked {
         name,
         triangles: mesh.triangles.len(),
@@ -201,6 +247,8 @@ fn one(
         },
         verify,
         forest,
+        mesh: as_mesh,
+        ahead: None,
     })
 }
 
@@ -234,6 +282,34 @@ fn forest(
         ground_error: t.pair_stderr.iter().map(|e| e[0]).fold(0.0, f32::max),
         tree_light_error: t.pair_stderr.iter().map(|e| e[1]).fold(0.0, f32::max),
         samples: [0.0, 30.0, 60.0, 80.0].map(sample).to_vec(),
+    })
+}
+
+/// Makes what a mesh takes, or reads it, and compares its levels of detail if asked.
+fn as_mesh(
+    args: &Args,
+    source: &Source,
+    (mesh, bake): (&Mesh, &SpeciesBake),
+    settings: &Settings,
+) -> Result<AsMesh> {
+    let start = Instant::now();
+    let (envelopes, around) = source.load_envelopes(settings.leaf_directions)?;
+    let (levels, from) = source.load_levels()?;
+    let seconds = start.elapsed().as_secs_f64();
+    let seen = Seen { mesh, bake, envelopes: &envelopes, levels: &levels };
+    let directions = |n: u32| n.max(LEAST_DIRECTIONS) as usize;
+    let verify =
+        args.verify.map(|n| bake::levels::verify(&seen, directions(n), f64::from(settings.leaf_pixels)));
+    Ok(AsMesh {
+        directions: settings.leaf_directions,
+        envelopes: around.name(),
+        levels: from.name(),
+        seconds,
+        cards: levels.cards.count,
+        card_side_m: levels.cards.side,
+        pull: levels.pull.to_vec(),
+        bark: levels.bark.iter().map(|b| (b.kept.len() + b.new.len(), b.error)).collect(),
+        verify: verify.transpose()?.unwrap_or_default(),
     })
 }
 
@@ -311,5 +387,69 @@ fn text(b: &Baked) -> String {
         }
         text += &format!("  z-field against mesh, {} directions\n{}", b.verify[0].directions, table.text());
     }
-    text
+    text + &b.mesh.as_ref().map_or(String::new(), mesh_text)
+        + &b.ahead.as_ref().map_or(String::new(), ahead_text)
+}
+
+/// What a mesh takes, and its levels of detail.
+fn mesh_text(m: &AsMesh) -> String {
+    let mut table = Table::new(2, &["  as a mesh", ""]);
+    table.row([
+        "  cache: crowns around leaves".into(),
+        format!("{}, {} directions", m.envelopes, m.directions),
+    ]);
+    table.row(["  cache: levels of detail".into(), m.levels.into()]);
+    table.row(["  time".into(), format!("{:.2} s", m.seconds)]);
+    table.row(["  cards of leaves".into(), format!("{} of {:.2} m", m.cards, m.card_side_m)]);
+    for (k, (triangles, error)) in m.bark.iter().enumerate() {
+        table.row([
+            format!("  bark, level {k}"),
+            format!("{triangles} triangles, within {:.1} cm", 100.0 * error),
+        ]);
+    }
+    let text = table.text();
+    if m.verify.is_empty() {
+        return text;
+    }
+    let headings = [
+        "leaves",
+        "tree, px",
+        "triangles",
+        "pull",
+        "bark",
+        "coverage",
+        "worst",
+        "IoU mean",
+        "min",
+        "radiance",
+        "worst",
+    ];
+    let mut table = Table::new(0, &headings);
+    for q in &m.verify {
+        let worst = |part: fn(&bake::levels::Agreement) -> f64| {
+            let [low, high] = q.range.map(|a| part(&a));
+            format!("{:.4}", if 1.0 - low > high - 1.0 { low } else { high })
+        };
+        table.row([
+            format!("{}", q.share),
+            format!("{:.0}", q.height_px),
+            q.leaf_triangles.to_string(),
+            format!("{:.3}", q.pull),
+            format!("{}: {}", q.bark_level, q.bark_triangles),
+            format!("{:.4}", q.mean.coverage),
+            worst(|a| a.coverage),
+            format!("{:.4}", q.mean.iou),
+            format!("{:.4}", q.range[0].iou),
+            format!("{:.4}", q.mean.radiance),
+            worst(|a| a.radiance),
+        ]);
+    }
+    text + "  levels of detail against the whole mesh\n" + &table.text()
+}
+
+fn ahead_text(a: &Ahead) -> String {
+    let mut table = Table::new(2, &["  ahead", ""]);
+    table.row(["  cache: tables".into(), a.tables.to_string()]);
+    table.row(["  cache: light of all orders".into(), a.indirect.unwrap_or("not asked for").to_string()]);
+    table.text()
 }

@@ -54,6 +54,7 @@ pub fn run(args: &Args) -> Result<()> {
             ("trees by graphics", has(d.max_vertex_components >= tree_components())),
             ("pushed descriptors", has(d.push_descriptors)),
             ("layers by vertices", has(d.vertex_layers)),
+            ("draws counted by shaders", has(d.counted_draws)),
             ("pipeline statistics", has(d.pipeline_statistics)),
         ] {
             table.row([format!("  {what}"), value]);

@@ -1,22 +1,32 @@
-//! Models of the species as meshes on the GPU: corners, faces, the crowns around leaves, holes, and what their surfaces reflect.
+//! Models of the species as meshes on the GPU: corners, faces, their levels of detail, the crowns around leaves, holes, and what their surfaces
+//! reflect.
 
 use glam::Vec2;
 use half::f16;
 
 use crate::bake::envelope::Envelopes;
 use crate::bake::hiding::{self, HEIGHTS};
+use crate::bake::levels::Levels;
 use crate::bake::surface::{Face, Mask, Surface};
-use crate::bake::turning::{Turning, turning};
+use crate::bake::turning::{Turning, packed_place, turning};
 use crate::bake::{Baked, SpeciesBake};
 use crate::forest::species::mean_squared_scale;
-use crate::gpu::interface::{HIDING_STEPS, MAX_SPECIES, MESH_TRIANGLES, MeshDraw, MeshFace, NO_PAGE};
+use crate::gpu::interface::{
+    BARK_LEVELS, BARK_PIXELS, FADE_BAND, HIDING_STEPS, LEAF_OCTAVES, LEAST_SHARE, MAX_SPECIES,
+    MESH_TRIANGLES, MeshFace, MeshKind, NO_PAGE,
+};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
 use crate::physics::crown::Crown;
 use crate::physics::leaf::Directions;
+use crate::physics::levels::{self, OCTAVES};
 use crate::plan::names::resource;
 use crate::plan::{Plan, envelope_words};
 use crate::scene::{Scene, Species};
 use crate::{Error, Result};
+
+const _: () = assert!(LEAF_OCTAVES as usize == OCTAVES && BARK_LEVELS as usize == levels::BARK_LEVELS);
+const _: () = assert!(LEAST_SHARE == levels::LEAST_SHARE as f32 && FADE_BAND == levels::FADE_BAND as f32);
+const _: () = assert!(BARK_PIXELS == levels::BARK_PIXELS as f32);
 
 /// Steps of texture coordinates along a texture; as `UV_STEPS` in `shaders/frame/trees/meshes/corner.glsl`.
 const UV_STEPS: f32 = 2048.0;
@@ -33,10 +43,16 @@ pub struct MeshData {
     pub envelopes: Buffer,
     /// Where materials are holes, one a layer.
     pub masks: Image,
-    /// [`MeshDraw`]s of the species; how many trees each draws is each frame's.
-    pub draws: Buffer,
-    /// Indices of the trees in view that are meshes, species after species.
+    /// [`MeshKind`]s of the species; how many trees are of each is each frame's.
+    pub kinds: Buffer,
+    /// Indices of corners, in the orders in which they are drawn.
+    pub indices: Buffer,
+    /// [`crate::gpu::interface::MeshTree`]s in view, species after species.
     pub trees: Buffer,
+    /// [`crate::gpu::interface::DrawCommand`]s of these, [`crate::gpu::interface::MESH_DRAWS`] each.
+    pub draws: Buffer,
+    /// How many of them there are.
+    pub draw_count: Buffer,
     /// Directions of envelopes with their weights, and what of their cells is sky.
     pub rule: Buffer,
     /// What trees hide of the sky from neighbours: a step of height a texel, direction by direction.
@@ -57,7 +73,10 @@ struct Content {
     corners: Vec<[u32; 4]>,
     faces: Vec<MeshFace>,
     envelopes: Vec<f16>,
-    draws: Vec<MeshDraw>,
+    indices: Vec<u32>,
+    kinds: Vec<MeshKind>,
+    /// Triangles of the models themselves so far.
+    names: u32,
     masks: Vec<Mask>,
 }
 
@@ -78,7 +97,10 @@ impl MeshData {
                         "a species was baked without the crown around its leaves that the plan lists".into(),
                     )
                 })?;
-            all.add(species, envelopes, plan.wind)?;
+            let levels = bake.levels.as_ref().ok_or_else(|| {
+                Error::Usage("a species was baked without the levels of detail that the plan lists".into())
+            })?;
+            all.add(species, envelopes, levels, plan.wind)?;
         }
         let (pairs, top) = hiding_pairs(scene, baked, rule.len());
         let texels = |name, bytes: &[u8]| -> Result<Buffer> {
@@ -93,55 +115,100 @@ impl MeshData {
             faces: texels(resource::MESH_FACES, bytemuck::cast_slice(&all.faces))?,
             envelopes: texels(resource::ENVELOPES, bytemuck::cast_slice(&bits(&all.envelopes)))?,
             masks: masks(gpu, plan, &all.masks)?,
-            draws: gpu.described_buffer_with(&plan.buffer(resource::MESH_DRAWS), &all.draws)?,
+            indices: texels(resource::MESH_INDICES, bytemuck::cast_slice(&all.indices))?,
+            kinds: gpu.described_buffer_with(&plan.buffer(resource::MESH_KINDS), &all.kinds)?,
+            draws: gpu.described_buffer(&plan.buffer(resource::MESH_DRAWS))?,
+            draw_count: gpu.buffer("mesh draw count", 4)?,
             trees: gpu.described_buffer(&plan.buffer(resource::MESH_TREES))?,
             rule: gpu.buffer_with("leaf directions", &rule_block(&rule))?,
             hiding: gpu.described_buffer_with(&plan.buffer(resource::HIDING), &pairs)?,
             top: top as f32,
             optics: gpu.buffer_with("leaf optics", &optics_block(baked))?,
-            species: all.draws.len() as u32,
+            species: all.kinds.len() as u32,
             power: rule.power as u32,
         })
     }
 }
 
 impl Content {
-    fn add(&mut self, species: &Species, envelopes: &Envelopes, wind: bool) -> Result<()> {
+    fn add(&mut self, species: &Species, envelopes: &Envelopes, levels: &Levels, wind: bool) -> Result<()> {
         let mesh = &species.mesh;
         let surface = Surface::new(mesh)?;
-        if surface.faces.len() > MESH_TRIANGLES as usize {
+        let count = surface.faces.len() + levels.extra();
+        if count > MESH_TRIANGLES as usize {
             return Err(Error::Usage(format!(
-                "species \"{}\" has {} triangles, and meshes of up to {MESH_TRIANGLES} are drawn: simplify the model, or use a ladder \
-                 without mesh",
+                "species \"{}\" has {count} triangles with its levels of bark, and meshes of up to {MESH_TRIANGLES} are drawn: simplify the model, or use \
+                 a ladder without mesh",
                 species.name,
-                surface.faces.len()
             )));
         }
         let any = mesh.materials.iter().any(|m| m.foliage);
-        let first_face = self.faces.len() as u32;
-        let first_mask = self.masks.len() as u32;
-        let words = 8 * envelope_words(envelopes.directions as u32) as usize;
+        let (first_face, first_mask) = (self.faces.len() as u32, self.masks.len() as u32);
         let is_leaf = |f: &Face| !any || mesh.materials[f.material as usize].foliage;
         let turning = if wind { turning(&surface, is_leaf) } else { Vec::new() };
         for (k, face) in (0u32..).zip(&surface.faces) {
-            self.corners.extend(corners(&surface, face));
+            let at = k as usize;
             let leaf = u32::from(is_leaf(face));
-            let [turns, middle] = turning.get(k as usize).copied().flatten().map_or([0; 2], Turning::packed);
-            let mask = face.mask.map_or(NO_PAGE, |m| first_mask + m);
-            self.faces.push(MeshFace { mask, foliage: leaf | turns, spare: 0, middle });
-            for around in envelopes.of(k) {
-                let halves = around.iter().map(|t| f16::from_f64(*t));
-                self.envelopes.extend(halves.chain(std::iter::repeat(f16::ZERO)).take(words));
-            }
+            // Triangles of a leaf that turns keep together: their middle is the leaf's, also where a level draws few of them.
+            let card = packed_place(levels.cards.middle[at]);
+            let [turns, middle] = turning.get(at).copied().flatten().map_or([0, card], Turning::packed);
+            let kind = MeshFace {
+                mask: face.mask.map_or(NO_PAGE, |m| first_mask + m),
+                foliage: leaf | turns,
+                rank: levels.cards.rank[at],
+                middle,
+            };
+            self.push((&surface, face), kind, envelopes.of(k));
         }
-        self.masks.extend(surface.masks);
-        self.draws.push(MeshDraw {
-            first_vertex: 3 * first_face,
+        let face_count = self.faces.len() as u32 - first_face;
+        let mut kind = MeshKind {
+            half_box: surface.frame.scale().to_array(),
+            card_side: levels.cards.side as f32,
             first_face,
-            face_count: self.faces.len() as u32 - first_face,
+            face_count,
+            first_name: self.names,
+            first_whole: self.order(first_face, 0..face_count),
+            first_leaf: self.order(first_face, levels.cards.order.iter().copied()),
+            leaf_count: levels.cards.order.len() as u32,
+            bark_levels: levels.bark.len() as u32,
+            leaf_middle: (levels.cards.centre * surface.frame.scale()).to_array(),
+            pull: levels.pull.map(|w| w as f32),
             ..bytemuck::Zeroable::zeroed()
-        });
+        };
+        self.names += face_count;
+        for (level, bark) in levels.bark.iter().enumerate() {
+            let first_new = self.faces.len() as u32 - first_face;
+            for new in &bark.new {
+                let none = MeshFace { mask: NO_PAGE, ..bytemuck::Zeroable::zeroed() };
+                self.push((&surface, &new.face(&surface)), none, envelopes.of(new.like));
+            }
+            let all = bark.kept.iter().copied().chain((first_new..).take(bark.new.len()));
+            kind.first_bark[level] = self.order(first_face, all);
+            kind.bark_count[level] = (bark.kept.len() + bark.new.len()) as u32;
+            // No less than it is.
+            kind.bark_error[level] = (bark.error as f32).next_up();
+        }
+        self.kinds.push(kind);
+        self.masks.extend(surface.masks);
         Ok(())
+    }
+
+    /// A triangle, and what its surroundings leave of light above and below.
+    fn push(&mut self, (surface, face): (&Surface, &Face), kind: MeshFace, around: [&[f64]; 2]) {
+        self.corners.extend(corners(surface, face));
+        self.faces.push(kind);
+        for thickness in around {
+            let words = 8 * envelope_words(thickness.len() as u32) as usize;
+            let halves = thickness.iter().map(|t| f16::from_f64(*t));
+            self.envelopes.extend(halves.chain(std::iter::repeat(f16::ZERO)).take(words));
+        }
+    }
+
+    /// Indices of a model's triangles in an order, and the first of them.
+    fn order(&mut self, first_face: u32, triangles: impl Iterator<Item = u32>) -> u32 {
+        let first = self.indices.len() as u32;
+        self.indices.extend(triangles.flat_map(|k| [0, 1, 2].map(|corner| 3 * (first_face + k) + corner)));
+        first
     }
 }
 

@@ -135,8 +135,8 @@ impl Canvas {
         let trees = passes.trees.as_ref().filter(|_| plan.shows_trees()).zip(world.near());
         let meshes = passes.meshes.as_ref().zip(world.meshes());
         passes.ground.see(r, view, indices, ground, &self.targets);
-        if let Some((pass, (forest, cull, data))) = meshes {
-            pass.see(r, view, &forest.species, (cull, data, plan.last_mesh_range), &self.targets);
+        if let Some((pass, (_, cull, data))) = meshes {
+            pass.see(r, view, (cull, data, plan.last_mesh_range), &self.targets);
         }
         if let Some((horizon, far)) = passes.horizon.as_ref().zip(forest) {
             if streamed.far_trees {
@@ -175,7 +175,7 @@ impl Canvas {
             reads.tiles = Some(tiles.read_state(recorder)?);
         }
         if let Some((pass, (_, _, data))) = passes.meshes.as_ref().zip(world.meshes()) {
-            reads.meshes = Some(pass.read_draws(recorder, data)?);
+            reads.meshes = Some(pass.read_kinds(recorder, data)?);
         }
         Ok(())
     }

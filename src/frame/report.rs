@@ -2,7 +2,7 @@
 
 use crate::clock::{process_cpu_ms_since, process_cpu_ns};
 use crate::forest::cull::TreeCounts;
-use crate::gpu::interface::{DrawCommand, MeshDraw, TileState, View};
+use crate::gpu::interface::{DrawCommand, MeshKind, TileState, View};
 use crate::gpu::{Done, InFlight, Later, Timing};
 
 /// Contents of the caches, by cache.
@@ -75,8 +75,8 @@ impl Began {
 pub(super) struct ReadBacks {
     /// What the tiles found.
     pub tiles: Option<Later<TileState>>,
-    /// Draws of meshes.
-    pub meshes: Option<Later<MeshDraw>>,
+    /// Species as meshes, with how many trees are such.
+    pub meshes: Option<Later<MeshKind>>,
     /// Trees in view.
     pub trees: Option<Later<u32>>,
     /// Draws of casters, and the cascade of each of a batch's.
@@ -93,7 +93,7 @@ impl ReadBacks {
             counts.camera = done.get(total)[0];
         }
         if let Some(draws) = &self.meshes {
-            counts.meshes = done.get(draws).iter().map(|d| d.instance_count).sum();
+            counts.meshes = done.get(draws).iter().map(|k| k.tree_count).sum();
         }
         if let Some((commands, cascades)) = &self.casters {
             for (command, cascade) in done.get(commands).iter().zip(cascades.iter().cycle()) {

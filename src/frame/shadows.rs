@@ -364,10 +364,9 @@ impl Shadows {
             &[
                 ("view", Resource::Buffer(view)),
                 ("casters", Resource::Buffer(&trees.data.casters)),
-                ("draws", Resource::Buffer(&meshes.draws)),
+                ("kinds", Resource::Buffer(&meshes.kinds)),
                 ("corners", Resource::Texels(&meshes.corners)),
                 ("faces", Resource::Texels(&meshes.faces)),
-                ("species", Resource::Buffer(&trees.species.table)),
                 ("masks", Resource::Texture(&meshes.masks, Sampler::LinearRepeat)),
             ],
         );

@@ -97,6 +97,7 @@ impl Gpu {
         let root = Root::new(options.validation)?;
         let (physical, mut info) = choose(&root.instance, options.device.as_deref())?;
         info.vertex_layers &= !options.frugal;
+        info.counted_draws &= !options.frugal;
         // GPU-assisted validation (1.3.239) takes pushed descriptors for uninitialised, and checks nothing behind them.
         info.push_descriptors &= !options.frugal && options.validation != Validation::GpuAssisted;
         let shared = open(root, physical, info, failures)?;
@@ -205,11 +206,14 @@ fn open(root: Root, physical: vk::PhysicalDevice, info: DeviceInfo, failures: Fa
         let calibration = calibration_extension(&root.entry, &instance, physical);
         let push = info.push_descriptors.then_some(khr::push_descriptor::NAME);
         let extensions: Vec<_> = [push, calibration].into_iter().flatten().map(CStr::as_ptr).collect();
-        let features =
-            vk::PhysicalDeviceFeatures::default().pipeline_statistics_query(info.pipeline_statistics);
+        let features = vk::PhysicalDeviceFeatures::default()
+            .pipeline_statistics_query(info.pipeline_statistics)
+            .multi_draw_indirect(info.counted_draws)
+            .draw_indirect_first_instance(info.counted_draws);
         let mut f12 = vk::PhysicalDeviceVulkan12Features::default()
             .timeline_semaphore(true)
-            .shader_output_layer(info.vertex_layers);
+            .shader_output_layer(info.vertex_layers)
+            .draw_indirect_count(info.counted_draws);
         let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
             .synchronization2(true)
             .dynamic_rendering(true)

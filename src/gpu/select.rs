@@ -45,6 +45,8 @@ pub struct DeviceInfo {
     pub push_descriptors: bool,
     /// Vertex shaders choose the layer that they draw to; otherwise each layer is drawn by itself.
     pub vertex_layers: bool,
+    /// It takes indexed draws as many as a shader has counted, each with a first instance of its own; otherwise they are recorded one by one.
+    pub counted_draws: bool,
     /// Why canopy cannot use it; empty if it can.
     pub missing: Vec<String>,
 }
@@ -212,7 +214,7 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
         String::from_utf8_lossy(&bytes).into_owned()
     };
     let mut missing = Vec::new();
-    let (mut pipeline_statistics, mut vertex_layers) = (false, false);
+    let (mut pipeline_statistics, mut vertex_layers, mut counted_draws) = (false, false, false);
     let (mut id, mut driver) =
         (vk::PhysicalDeviceIDProperties::default(), vk::PhysicalDeviceDriverProperties::default());
     let api = base.api_version;
@@ -228,8 +230,11 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
             instance.get_physical_device_features2(p, &mut f);
             instance.get_physical_device_properties2(p, &mut props);
         }
+        let several =
+            [f.features.multi_draw_indirect, f.features.draw_indirect_first_instance] == [vk::TRUE; 2];
         pipeline_statistics = f.features.pipeline_statistics_query == vk::TRUE;
         vertex_layers = f12.shader_output_layer == vk::TRUE;
+        counted_draws = several && f12.draw_indirect_count == vk::TRUE;
         for (has, what) in [
             (f13.synchronization2, "synchronization2"),
             (f13.dynamic_rendering, "dynamicRendering"),
@@ -285,6 +290,7 @@ fn describe(instance: &ash::Instance, p: vk::PhysicalDevice) -> DeviceInfo {
         max_vertex_components: l.max_vertex_output_components.min(l.max_fragment_input_components),
         push_descriptors,
         vertex_layers,
+        counted_draws,
         missing,
     }
 }

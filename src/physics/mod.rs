@@ -7,6 +7,7 @@ pub mod handover;
 pub mod hash;
 pub mod indirect;
 pub mod leaf;
+pub mod levels;
 pub mod lift;
 pub mod light;
 pub mod masks;

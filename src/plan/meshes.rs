@@ -3,14 +3,20 @@
 use super::Plan;
 use super::items::Items;
 use super::names::resource;
-use crate::gpu::interface::{HIDING_STEPS, MESH_TREES, MeshDraw, MeshFace};
+use crate::gpu::interface::{
+    DrawCommand, HIDING_STEPS, MESH_DRAWS, MESH_TREES, MeshFace, MeshKind, MeshTree,
+};
 use crate::gpu::{BufferDesc, Description, ImageDesc, vk};
+use crate::physics::levels::BARK_LEVELS;
+use crate::scene::mesh::Triangle;
 use crate::scene::{Mesh, Scene};
 
 /// Format and bytes of the texels as which corners, faces and envelopes are read.
 const WORDS: (vk::Format, u64) = (vk::Format::R32G32B32A32_UINT, 16);
 /// The same for what trees hide of the sky.
 const PAIRS: (vk::Format, u64) = (vk::Format::R32G32_SFLOAT, 8);
+/// The same for indices.
+const INDEX: (vk::Format, u64) = (vk::Format::R32_UINT, 4);
 /// Bytes of a corner: its place and its texture coordinates.
 const CORNER_BYTES: u64 = 16;
 /// Texels along a side of a leaf mask, at most and at least.
@@ -48,19 +54,36 @@ pub fn envelope_words(directions: u32) -> u32 {
     directions.div_ceil(8)
 }
 
+/// Most triangles of a mesh with its levels of bark, each of which has at most half of what the finer one has; and of the orders in which they are drawn: the whole, the leaves,
+/// and the bark with its levels.
+fn most_triangles(mesh: &Mesh) -> [u64; 2] {
+    let foliage = |t: &&Triangle| mesh.materials[t.material as usize].foliage;
+    let (all, leaves) = (mesh.triangles.len() as u64, mesh.triangles.iter().filter(foliage).count() as u64);
+    // Without foliage all are leaves.
+    let bark = if leaves > 0 { all - leaves } else { 0 };
+    [all + bark, all + all + bark * (BARK_LEVELS as u64 - 1)]
+}
+
 impl Plan {
     /// Corners, faces, crowns around leaves, and holes.
     pub(super) fn list_meshes(&self, scene: &Scene, items: &mut Items) {
         let words = |name, bytes| BufferDesc { texels: Some(WORDS), ..BufferDesc::new(name, bytes) };
-        let triangles: u64 = scene.species.iter().map(|s| s.mesh.triangles.len() as u64).sum();
+        let most = scene.species.iter().map(|s| most_triangles(&s.mesh));
+        let [triangles, drawn] = most.fold([0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
         let corners = words(resource::MESH_CORNERS, 3 * triangles * CORNER_BYTES);
         let faces = words(resource::MESH_FACES, triangles * size_of::<MeshFace>() as u64);
+        let indices = BufferDesc {
+            texels: Some(INDEX),
+            ..BufferDesc::new(resource::MESH_INDICES, 3 * drawn * INDEX.1)
+        };
+        let kinds =
+            BufferDesc::new(resource::MESH_KINDS, (scene.species.len() * size_of::<MeshKind>()) as u64);
         let reason = format!(
-            "{} models, whose triangles are drawn to {:.0} m",
+            "{} models and their levels of detail, whose triangles are drawn to {:.0} m",
             scene.species.len(),
             self.last_mesh_range
         );
-        items.add("data", "meshes", reason, [corners, faces]);
+        items.add("data", "meshes", reason, [corners, faces, indices, kinds]);
         let directions = scene.settings.leaf_directions;
         let envelopes =
             words(resource::ENVELOPES, 2 * triangles * 16 * u64::from(envelope_words(directions)));
@@ -77,9 +100,10 @@ impl Plan {
             };
             items.add("data", "leaf masks", format!("{layers} materials have holes"), [image]);
         }
-        let draws =
-            BufferDesc::new(resource::MESH_DRAWS, (scene.species.len() * size_of::<MeshDraw>()) as u64);
-        let trees = BufferDesc::new(resource::MESH_TREES, 4 * u64::from(MESH_TREES));
+        let commands = u64::from(MESH_DRAWS * MESH_TREES) * size_of::<DrawCommand>() as u64;
+        let draws = BufferDesc::new(resource::MESH_DRAWS, commands);
+        let trees =
+            BufferDesc::new(resource::MESH_TREES, u64::from(MESH_TREES) * size_of::<MeshTree>() as u64);
         let all: [Description; 2] = [draws.into(), trees.into()];
         items.add("target", "mesh trees", format!("up to {MESH_TREES} trees are meshes"), all);
     }

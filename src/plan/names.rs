@@ -132,7 +132,11 @@ pub mod resource {
     pub const HIDING: &str = "hidden sky";
     /// Where the meshes' materials are holes.
     pub const LEAF_MASKS: &str = "leaf masks";
-    /// Draws of the meshes.
+    /// Indices of the meshes' triangles, in the orders in which they are drawn.
+    pub const MESH_INDICES: &str = "mesh indices";
+    /// Where each species' mesh is, and its levels of detail.
+    pub const MESH_KINDS: &str = "mesh kinds";
+    /// Draws of the trees that are meshes.
     pub const MESH_DRAWS: &str = "mesh draws";
     /// Trees in view that are meshes.
     pub const MESH_TREES: &str = "mesh trees";

@@ -13,7 +13,10 @@ fn a_device_without_what_vulkan_does_not_promise_draws_the_same_bits() {
     let pictures = [false, true].map(|frugal| {
         let gpu =
             device::open_with(&GpuOptions { validation: Validation::Full, frugal, ..GpuOptions::default() });
-        assert_eq!([gpu.info().push_descriptors, gpu.info().vertex_layers].contains(&true), !frugal);
+        assert_eq!(
+            [gpu.info().push_descriptors, gpu.info().vertex_layers, gpu.info().counted_draws].contains(&true),
+            !frugal
+        );
         let mut renderer = device::renderer(&gpu, &scene, &scene.cameras[0], SIZE, true);
         let mut draw = |frame| {
             let report = renderer.render(&device::jump(&scene, frame), 1.0).unwrap();

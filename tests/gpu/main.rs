@@ -16,6 +16,7 @@ mod handover;
 mod in_flight;
 mod indirect;
 mod leaf;
+mod levels;
 mod light;
 mod light_on_ground;
 mod meshes;

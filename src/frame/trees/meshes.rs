@@ -2,11 +2,11 @@
 
 use crate::forest::cull::CullData;
 use crate::forest::meshes::MeshData;
-use crate::forest::species::SpeciesData;
 use crate::frame::Forest;
 use crate::frame::targets::ImageTargets;
 use crate::gpu::interface::{
-    HIDING_STEPS, MESH_TREES, MeshDraw, MeshLightParameters, MeshParameters, TILE_SIDE,
+    DrawCommand, HIDING_STEPS, MESH_DRAWS, MESH_TREES, MeshKind, MeshLightParameters, MeshParameters,
+    TILE_SIDE,
 };
 use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, Later, Layers, Program, Recorder, Resource, Sampler,
@@ -24,6 +24,10 @@ pub struct Meshes {
     light: Program,
     tiles: [u32; 2],
     size: [u32; 2],
+    /// Least side of a leaf card on the screen, pixels.
+    leaf_pixels: f32,
+    /// Whether the device takes all draws at once, as many as a shader has counted, and each names its tree.
+    counted: bool,
 }
 
 impl Meshes {
@@ -62,15 +66,17 @@ impl Meshes {
             )?,
             tiles: plan.size.map(|n| n.div_ceil(TILE_SIDE)),
             size: plan.size,
+            leaf_pixels: scene.settings.leaf_pixels,
+            counted: gpu.info().counted_draws,
         })
     }
 
-    /// Records which of the trees in view, up to a distance in metres, are meshes, and which triangle of them each sample sees.
+    /// Records which of the trees in view, up to a distance in metres, are meshes, how much of each is drawn, and which triangle of them each
+    /// sample sees.
     pub fn see(
         &self,
         recorder: &mut Recorder,
         view: &Buffer,
-        species: &SpeciesData,
         (cull, data, range): (&CullData, &MeshData, f64),
         targets: &ImageTargets,
     ) {
@@ -78,10 +84,12 @@ impl Meshes {
             ("view", Resource::Buffer(view)),
             ("trees", Resource::Texels(&cull.trees)),
             ("lists", Resource::Buffer(&cull.lists)),
-            ("species", Resource::Buffer(&species.table)),
             ("starts", Resource::Buffer(&cull.starts)),
             ("totals", Resource::Buffer(&cull.totals)),
+            ("kinds", Resource::Buffer(&data.kinds)),
             ("draws", Resource::Buffer(&data.draws)),
+            ("draw_count", Resource::Buffer(&data.draw_count)),
+            ("indices", Resource::Texels(&data.indices)),
             ("mesh_trees", Resource::Buffer(&data.trees)),
             ("corners", Resource::Texels(&data.corners)),
             ("faces", Resource::Texels(&data.faces)),
@@ -89,16 +97,28 @@ impl Meshes {
         ];
         recorder.compute(pass::MESH_LISTS, |pass| {
             pass.bind(&self.list, &all);
-            pass.push(&MeshParameters { bins: cull.bins_within(range), species_count: data.species });
+            pass.push(&MeshParameters {
+                bins: cull.bins_within(range),
+                species_count: data.species,
+                leaf_pixels: self.leaf_pixels,
+                named: u32::from(self.counted),
+            });
             pass.dispatch([1, 1, 1]);
         });
         let colors: Vec<_> = targets.quads.iter().map(|q| q.attachment(None, false)).collect();
         let depth = Some(targets.depth.attachment(None, false));
         recorder.render(pass::MESHES, &Targets { colors: &colors, depth, layers: Layers::One(0) }, |pass| {
             pass.bind(&self.draw, &all);
-            for species in 0..data.species {
-                pass.push(&species);
-                pass.draw_indirect(&data.draws, u64::from(species) * size_of::<MeshDraw>() as u64);
+            let most = MESH_DRAWS * MESH_TREES;
+            if self.counted {
+                pass.push(&0u32);
+                pass.draw_indexed_counted(&data.indices, (&data.draws, 0), &data.draw_count, most);
+                return;
+            }
+            for draw in 0..most {
+                pass.push(&(draw / MESH_DRAWS));
+                let command = u64::from(draw) * size_of::<DrawCommand>() as u64;
+                pass.draw_indexed_indirect(&data.indices, &data.draws, command);
             }
         });
     }
@@ -122,7 +142,7 @@ impl Meshes {
                 ("view", Resource::Buffer(view)),
                 ("trees", Resource::Texels(&cull.trees)),
                 ("species", Resource::Buffer(&forest.species.table)),
-                ("draws", Resource::Buffer(&data.draws)),
+                ("kinds", Resource::Buffer(&data.kinds)),
                 ("mesh_trees", Resource::Buffer(&data.trees)),
                 ("corners", Resource::Texels(&data.corners)),
                 ("faces", Resource::Texels(&data.faces)),
@@ -149,8 +169,8 @@ impl Meshes {
     ///
     /// # Errors
     /// [`Error::Usage`] when there were more than lists hold.
-    pub fn check(draws: &[MeshDraw]) -> Result<()> {
-        let total: u32 = draws.iter().map(|d| d.instance_count).sum();
+    pub fn check(kinds: &[MeshKind]) -> Result<()> {
+        let total: u32 = kinds.iter().map(|k| k.tree_count).sum();
         if total > MESH_TREES {
             return Err(Error::Usage(format!(
                 "{total} trees in view are near enough to be meshes, and {MESH_TREES} can be: raise mesh_min_pixels"
@@ -159,11 +179,11 @@ impl Meshes {
         Ok(())
     }
 
-    /// Has the draws of the species read back.
+    /// Has read back how many trees of each species are meshes.
     ///
     /// # Errors
     /// Those of [`Recorder::read`].
-    pub fn read_draws(&self, recorder: &mut Recorder, data: &MeshData) -> Result<Later<MeshDraw>> {
-        recorder.read(&data.draws, 0, data.species as usize)
+    pub fn read_kinds(&self, recorder: &mut Recorder, data: &MeshData) -> Result<Later<MeshKind>> {
+        recorder.read(&data.kinds, 0, data.species as usize)
     }
 }

@@ -239,6 +239,28 @@ impl RenderPass<'_, '_> {
         }
     }
 
+    /// Draws with 32-bit indices so many times as stands in `count`, at most `most`; the arguments are commands from byte `offset` of `commands` on.
+    /// Only where the device takes such ([`crate::gpu::DeviceInfo::counted_draws`]).
+    pub fn draw_indexed_counted(
+        &mut self,
+        indices: &Buffer,
+        (commands, offset): (&Buffer, u64),
+        count: &Buffer,
+        most: u32,
+    ) {
+        if self.work.program.is_none() {
+            return;
+        }
+        let r = &mut *self.work.recorder;
+        r.draws += 1;
+        // SAFETY: the buffers are alive and hold what the shader that wrote them put there, and the feature was enabled.
+        unsafe {
+            let (device, cmd) = (r.device(), r.cmd);
+            device.cmd_bind_index_buffer(cmd, indices.handle, 0, vk::IndexType::UINT32);
+            device.cmd_draw_indexed_indirect_count(cmd, commands.handle, offset, count.handle, 0, most, 20);
+        }
+    }
+
     /// Draws `count` 32-bit indices for each of the instances.
     pub fn draw_indexed(&mut self, indices: &Buffer, count: u32, instances: std::ops::Range<u32>) {
         if instances.is_empty() || self.work.program.is_none() {

@@ -19,11 +19,16 @@ vec3 turned_leaf(Motion m, uint name, uvec4 face, vec3 box, vec3 place) {
     return turns_in_wind(face) ? turned : place;
 }
 
-// Where the wind moves that to: a leaf goes with the branch that holds its middle; all then leans with the tree, from where the middle of the box is
-// moved to. `word` is that of the tree's species.
-vec3 blown(Motion m, uint word, uint name, uvec4 face, vec3 box, vec3 place) {
+// Where the wind carries a place of a leaf that it has turned, or of bark: a leaf goes with the branch that holds its middle; all then leans with the
+// tree, from where the middle of the box is moved to. `word` is that of the tree's species.
+vec3 carried(Motion m, uint word, uint name, uvec4 face, vec3 box, vec3 place) {
     vec3 anchor = turns_in_wind(face) ? leaf_middle(face.w, box) : place;
-    return swayed(word, turned_leaf(m, name, face, box, place) + branch_sway(m, anchor, name));
+    return swayed(word, place + branch_sway(m, anchor, name));
+}
+
+// Where the wind moves a place of the whole model to.
+vec3 blown(Motion m, uint word, uint name, uvec4 face, vec3 box, vec3 place) {
+    return carried(m, word, name, face, box, turned_leaf(m, name, face, box, place));
 }
 
 // A place of a model in the world, from the camera.

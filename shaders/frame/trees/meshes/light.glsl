@@ -20,8 +20,8 @@ layout(local_size_x = 8) in;
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 1) uniform usamplerBuffer trees;
 layout(std140, binding = 2) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
-layout(std430, binding = 3) readonly buffer Draws { MeshDraw items[]; } draws;
-layout(std430, binding = 4) readonly buffer MeshTrees { uint items[]; } mesh_trees;
+layout(std430, binding = 3) readonly buffer Kinds { MeshKind items[]; } kinds;
+layout(std430, binding = 4) readonly buffer MeshTrees { MeshTree items[]; } mesh_trees;
 layout(binding = 5) uniform usamplerBuffer corners;
 layout(binding = 6) uniform usamplerBuffer faces;
 layout(binding = 7) uniform usamplerBuffer seen;      // z-field trees, which are before what meshes show
@@ -83,11 +83,11 @@ float sun_left(Tree t, Species kind, vec3 world, vec3 n, float own) {
 // What a triangle shows to a pixel, at a place of the world from the camera.
 Shown shade(uint what, vec3 world) {
     View v = view.v;
-    uint index = mesh_trees.items[seen_tree(what)];
+    uint index = mesh_trees.items[seen_tree(what)].tree;
     Tree t = fetch_tree(trees, index);
     uint row = species_row(t.species);
     Species kind = species.items[row];
-    uint face = draws.items[row].first_face + seen_triangle(what);
+    uint face = kinds.items[row].first_face + seen_triangle(what);
     mat3 back = tree_rotation(t);
     vec3 a = corner_place(texelFetch(corners, int(3u * face))), viewer = back * normalize(-world), sun = back * v.sun_direction;
     vec3 b = corner_place(texelFetch(corners, int(3u * face + 1u))), c = corner_place(texelFetch(corners, int(3u * face + 2u)));
@@ -181,7 +181,7 @@ void main() {
         if (covered != 0u) store_pixel(pixel, all);
 #ifdef LAYERS
         if (first != ~0u) {
-            uint kind = species_row(texelFetch(trees, int(mesh_trees.items[seen_tree(ranks[first])]) * 8 + 1).z);
+            uint kind = species_row(texelFetch(trees, int(mesh_trees.items[seen_tree(ranks[first])].tree) * 8 + 1).z);
             store_first(pixel, kind + 1u, surface_depth(pixel, 0));
         }
 #endif
