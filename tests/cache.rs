@@ -206,7 +206,7 @@ fn forest() -> Scene {
          [sun]\nazimuth = 210.0\nelevation = 25.0\nirradiance = 1.0\n[sky]\nradiance = 0.1\n\
          [[camera]]\nname = \"c\"\nposition = [40.0, 60.0, 15.0]\ntarget = [150.0, 180.0, 0.0]\nvertical_fov = 50.0\n\
          [quality]\npreset = \"fast\"\nview_rings = 1\nview_resolution = 16\nocclusion_rays = 8\n\
-         transfer_bands = 1\ntable_angles = 4\ntable_densities = 2\ntable_rays = 32\n";
+         transfer_bands = 1\ntransfer_resolution = 8\ntable_angles = 4\ntable_densities = 2\ntable_rays = 32\n";
     let mut scene = scene::parse(text, Path::new("test.toml")).unwrap();
     scene.species[0].mesh = Arc::new(tree().clone());
     scene
@@ -238,7 +238,7 @@ fn a_knob_of_tables_bakes_tables_only() {
     let changes: [fn(&mut Scene); 3] = [
         |s| s.settings.table_angles = 5,
         |s| s.settings.table_densities = 3,
-        |s| s.settings.light_iterations = 0,
+        |s| s.settings.view_iterations = 2,
     ];
     for (k, change) in changes.into_iter().enumerate() {
         change(&mut scene);
@@ -249,6 +249,31 @@ fn a_knob_of_tables_bakes_tables_only() {
         assert!(before.iter().all(|(path, id)| after[path] == *id), "change {k}");
         assert_eq!(after.len(), before.len() + k + 1);
     }
+}
+
+#[test]
+fn looks_at_light_are_what_views_and_transfer_are_measured_for() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut scene = forest();
+    baked(&scene, dir.path());
+    // Another number measures anew what self-shadow is; none takes what is measured for one, and only tables know the difference.
+    for (looks, views, transfer) in [(1, BAKED.0, BAKED.1), (0, HIT.0, HIT.1)] {
+        scene.settings.light_iterations = looks;
+        let (_, states) = of_scene(&scene, Needs::ALL, dir.path());
+        assert_eq!(states, from(views, transfer, CacheState::Baked), "{looks}");
+    }
+}
+
+#[test]
+fn texels_of_light_transfer_leave_the_views() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut scene = forest();
+    let coarse = baked(&scene, dir.path());
+    scene.settings.transfer_resolution = 16;
+    let (fine, states) = of_scene(&scene, Needs::ALL, dir.path());
+    assert_eq!(states, from(HIT.0, Some(CacheState::Baked), CacheState::Baked));
+    let side = |b: &Baked| b.species.transfer.resolution;
+    assert_eq!((side(&coarse), side(&fine)), (8, 16));
 }
 
 #[test]

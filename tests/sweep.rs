@@ -276,6 +276,7 @@ fn differences_of_images_are_told() {
         "actual",
         "averaged",
         "command",
+        "detail",
         "distance_spread",
         "exposure",
         "flip",

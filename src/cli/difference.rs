@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use canopy::image::Layers;
 use canopy::measure::metrics::{
-    AVERAGED, Difference, Estimate, difference, display, flip, key_exposure, popping,
+    AVERAGED, Detail, Difference, Estimate, difference, display, flip, key_exposure, popping,
 };
 use canopy::{Error, Result};
 
@@ -145,7 +145,13 @@ fn text(r: &Report) -> String {
     }
     text += &errors.text();
     let mut seen = Table::new(1, &["as displayed", "", "95 % interval"]);
-    for (name, e) in [("FLIP", d.flip), ("structural similarity", d.ssim)] {
+    let of_detail = |of: fn(&Detail) -> Estimate| d.detail.as_ref().map(of);
+    for (name, e) in [
+        ("FLIP", d.flip),
+        ("structural similarity", d.ssim),
+        ("detail of crowns: gradient", of_detail(|d| d.gradient)),
+        ("detail of crowns: Laplacian", of_detail(|d| d.laplacian)),
+    ] {
         let [value, interval] = shown(e, 1.0, 4);
         seen.row([name.into(), value, interval]);
     }

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::{
-    DistanceBin, Estimate, RadianceError, Region, flip_error, over_distance, radiance_error, regions,
-    relative_noise, spread, structural,
+    Detail, DistanceBin, Estimate, RadianceError, Region, detail, flip_error, over_distance, radiance_error,
+    regions, relative_noise, spread, structural,
 };
 use crate::image::Layers;
 use crate::{Error, Result};
@@ -31,6 +31,8 @@ pub struct Difference {
     pub flip: Option<Estimate>,
     /// Structural similarity of the luminance as displayed.
     pub ssim: Option<Estimate>,
+    /// Energy of detail within crowns over the reference's.
+    pub detail: Option<Detail>,
     /// Radiance over the reference's by distance.
     pub over_distance: Vec<DistanceBin>,
     /// Largest of these ratios over the smallest, less 1.
@@ -66,6 +68,7 @@ pub fn difference(actual: &Layers, reference: &Layers, exposure: f64) -> Result<
         regions: parts.into_iter().filter_map(of).collect(),
         flip: flip_error(actual, reference, exposure),
         ssim: structural(actual, reference, exposure),
+        detail: detail(actual, reference, &all),
         distance_spread: spread(&bins),
         over_distance: bins,
     })

@@ -1,4 +1,4 @@
-//! How far an image is from a reference: error and bias of linear radiance by region, FLIP, structural similarity, popping,
+//! How far an image is from a reference: error and bias of linear radiance by region, FLIP, structural similarity, energy of detail, popping,
 //! and consistency over distance. Pure functions over [`Layers`].
 //!
 //! The reference may be noisy (a Monte-Carlo mean r + n with a known variance v of the mean, by pixel and channel). Its noise is
@@ -14,6 +14,7 @@
 //! included. A value that does not exist (no pixel of the region, a black reference, a pixel that is no finite number) is `None`;
 //! [`Difference::not_finite`] counts the last.
 
+mod detail;
 mod difference;
 mod distance;
 mod estimate;
@@ -23,6 +24,7 @@ mod radiance;
 mod region;
 mod ssim;
 
+pub use detail::{Detail, detail};
 pub use difference::{AVERAGED, Difference, difference};
 pub use distance::{DistanceBin, over_distance, spread};
 pub use estimate::{Estimate, block_sums, estimate};
