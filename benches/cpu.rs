@@ -83,7 +83,6 @@ fn baking(c: &mut Criterion) {
             resolution: 64,
             occlusion_rays: 16,
             transfer_bands: 0,
-            light_iterations: 1,
             transfer_resolution: 32,
         },
     );

@@ -75,12 +75,12 @@ macro_rules! knobs {
 }
 
 knobs! {
-    view_rings: u32, "", 1..=16, [6, 12, 12], bake [4, 6, 9, 12], "rings n of z-field views: 2n(n+1)+1 views over the hemisphere (9: 181); memory and bake time grow with the square";
+    view_rings: u32, "", 1..=16, [6, 10, 12], bake [4, 6, 9, 12], "rings n of z-field views: 2n(n+1)+1 views over the hemisphere (9: 181); memory and bake time grow with the square";
     view_resolution: u32, "texels", 16..=512, [128, 256, 256], bake [64, 128, 256, 512], "texels a side of a z-field view (a power of two); memory and bake time grow with the square";
     view_iterations: u32, "", 1..=4, [1, 2, 3], bake [1, 2, 3, 4], "fixed-point iterations for the view ray; each costs three texel fetches a fragment";
-    light_iterations: u32, "", 0..=2, [2, 2, 2], bake [0, 1, 2], "iterations for the light ray, which self-shadow is measured for; 0 leaves out what grows with its length; each costs three texel fetches a fragment";
+    light_iterations: u32, "", 0..=2, [2, 2, 2], bake [0, 1, 2], "iterations for the light ray; 0 leaves out what grows with its length; each costs three texel fetches a fragment; self-shadow is measured for 1";
     transfer_bands: u32, "", 0..=2, [1, 2, 2], bake [0, 1, 2], "bands of light transfer, which knows from where the sun reaches each texel's leaves (0: none); memory, and each three texel fetches a fragment";
-    transfer_resolution: u32, "texels", 8..=512, [64, 128, 256], bake [32, 64, 128, 256], "texels a side of the light transfer of a view (a power of two, at most the view's): how sharp single leaves are lit where trees are large; memory grows with the square";
+    transfer_resolution: u32, "texels", 8..=512, [64, 128, 128], bake [32, 64, 128, 256], "texels a side of the light transfer of a view (a power of two, at most the view's): how sharp single leaves are lit where trees are large; memory grows with the square";
     occlusion_rays: u32, "", 8..=1024, [32, 64, 128], bake [16, 32, 64, 128, 256], "rays a cell for baked ambient occlusion; bake time";
     samples: u32, "", 1..=8, [4, 4, 8], draw [1, 4, 8], "samples a pixel (1, 4 or 8, as far as the device goes): levels of opacity; fill cost";
     mesh_min_pixels: f32, "px", 16.0..=65536.0, [384.0, 256.0, 192.0], draw [], "apparent tree height under which trees are no longer their models' meshes, where the ladder has that rung; cost grows with its inverse square";

@@ -11,14 +11,8 @@ use canopy::physics::{light, transfer, views, zfield};
 use canopy::scene::{Mesh, OpticsOverride, Texture};
 use glam::DVec3;
 
-const SMALL: BakeSettings = BakeSettings {
-    rings: 3,
-    resolution: 64,
-    occlusion_rays: 16,
-    transfer_bands: 0,
-    light_iterations: 1,
-    transfer_resolution: 32,
-};
+const SMALL: BakeSettings =
+    BakeSettings { rings: 3, resolution: 64, occlusion_rays: 16, transfer_bands: 0, transfer_resolution: 32 };
 
 /// Square cards of side `side`, uniformly placed in a ball of radius `radius` on the ground, uniformly turned.
 fn cloud(cards: u32, radius: f32, side: f32) -> Mesh {
@@ -125,7 +119,6 @@ fn light_transfer_makes_a_lambertian_ball() {
         resolution: 64,
         occlusion_rays: 4,
         transfer_bands: 2,
-        light_iterations: 1,
         transfer_resolution: 32,
     };
     let bake = bake_species(&mesh, &OpticsOverride::default(), &settings, true).unwrap();
@@ -209,7 +202,6 @@ fn the_law_of_self_shadow_is_that_of_the_mesh() {
             resolution: 128,
             occlusion_rays: 8,
             transfer_bands: 0,
-            light_iterations: 1,
             transfer_resolution: 64,
         };
         let bake = bake_species(&mesh, &OpticsOverride::default(), &settings, true).unwrap();

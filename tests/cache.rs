@@ -14,14 +14,8 @@ use canopy::bake::{BakeSettings, Baked, BakedFrom, Needs, SpeciesBake, bake_spec
 use canopy::plan::Plan;
 use canopy::scene::{self, Albedo, Mesh, OpticsOverride, Scene, Texture};
 
-const SMALL: BakeSettings = BakeSettings {
-    rings: 1,
-    resolution: 16,
-    occlusion_rays: 1,
-    transfer_bands: 2,
-    light_iterations: 1,
-    transfer_resolution: 8,
-};
+const SMALL: BakeSettings =
+    BakeSettings { rings: 1, resolution: 16, occlusion_rays: 1, transfer_bands: 2, transfer_resolution: 8 };
 const OPTICS: OpticsOverride = OpticsOverride {
     leaf_reflectance: None,
     leaf_transmittance: None,
@@ -238,7 +232,7 @@ fn a_knob_of_tables_bakes_tables_only() {
     let changes: [fn(&mut Scene); 3] = [
         |s| s.settings.table_angles = 5,
         |s| s.settings.table_densities = 3,
-        |s| s.settings.view_iterations = 2,
+        |s| s.settings.light_iterations = 0,
     ];
     for (k, change) in changes.into_iter().enumerate() {
         change(&mut scene);
@@ -248,19 +242,6 @@ fn a_knob_of_tables_bakes_tables_only() {
         let after = files(dir.path());
         assert!(before.iter().all(|(path, id)| after[path] == *id), "change {k}");
         assert_eq!(after.len(), before.len() + k + 1);
-    }
-}
-
-#[test]
-fn looks_at_light_are_what_views_and_transfer_are_measured_for() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut scene = forest();
-    baked(&scene, dir.path());
-    // Another number measures anew what self-shadow is; none takes what is measured for one, and only tables know the difference.
-    for (looks, views, transfer) in [(1, BAKED.0, BAKED.1), (0, HIT.0, HIT.1)] {
-        scene.settings.light_iterations = looks;
-        let (_, states) = of_scene(&scene, Needs::ALL, dir.path());
-        assert_eq!(states, from(views, transfer, CacheState::Baked), "{looks}");
     }
 }
 

@@ -77,7 +77,6 @@ const SMALL: ForestSettings = ForestSettings {
     scale_range: [1.0, 1.0],
     poisson: true,
     hole_radius: 0.0,
-    light_iterations: 1,
     view_iterations: 2,
 };
 
@@ -95,7 +94,6 @@ fn ellipsoids() -> &'static SpeciesBake {
             resolution: 64,
             occlusion_rays: 8,
             transfer_bands: 0,
-            light_iterations: 1,
             transfer_resolution: 32,
         };
         bake_species(&common::ellipsoid(2.0, 4.0, 24), &Default::default(), &settings, true).unwrap()
@@ -563,7 +561,6 @@ fn fast_rays_agree_with_the_model() {
         resolution: 64,
         occlusion_rays: 4,
         transfer_bands: 0,
-        light_iterations: 1,
         transfer_resolution: 32,
     };
     let bake = bake_species(&mesh, &Default::default(), &settings, true).unwrap();

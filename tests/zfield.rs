@@ -14,7 +14,6 @@ fn sphere(rings: u32) -> SpeciesBake {
         resolution: 128,
         occlusion_rays: 16,
         transfer_bands: 0,
-        light_iterations: 1,
         transfer_resolution: 64,
     };
     bake_species(&common::ellipsoid(3.0, 6.0, 96), &Default::default(), &settings, true).unwrap()

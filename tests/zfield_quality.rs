@@ -12,7 +12,6 @@ fn check(name: &str, depth: f64) {
         resolution: 256,
         occlusion_rays: 8,
         transfer_bands: 0,
-        light_iterations: 1,
         transfer_resolution: 128,
     };
     let bake = bake_species(&mesh, &Default::default(), &settings, true).unwrap();

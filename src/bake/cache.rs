@@ -377,10 +377,6 @@ pub fn views_key(mesh: &Mesh, optics: &OpticsOverride, settings: &BakeSettings) 
         put(rgb.as_ref().map_or(&[], bytemuck::bytes_of));
     }
     put(optics.extinction.as_ref().map_or(&[], bytemuck::bytes_of));
-    // Likewise one iteration is not named: it is what all had before there was a choice.
-    if settings.light_iterations != 1 {
-        put(&settings.light_iterations.to_le_bytes());
-    }
     put_mesh(&mut fields, mesh);
     fields.key()
 }

@@ -372,7 +372,6 @@ mod tests {
             resolution: 16,
             occlusion_rays: 8,
             transfer_bands: 0,
-            light_iterations: 1,
             transfer_resolution: 8,
         };
         let bake = bake_species(&mesh, &optics, &settings, true).unwrap();

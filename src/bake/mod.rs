@@ -131,8 +131,6 @@ pub struct BakeSettings {
     pub occlusion_rays: u32,
     /// Bands of light transfer, 0 to 2.
     pub transfer_bands: u32,
-    /// Iterations of the light ray that self-shadow and light transfer are measured for, 1 or 2.
-    pub light_iterations: u32,
     /// Texels a side of the light transfer of a view: a power of two, 8 to the view's.
     pub transfer_resolution: u32,
 }
@@ -144,7 +142,6 @@ impl From<&Settings> for BakeSettings {
             resolution: s.view_resolution,
             occlusion_rays: s.occlusion_rays,
             transfer_bands: s.transfer_bands,
-            light_iterations: s.light_iterations.max(1),
             transfer_resolution: s.transfer_side(),
         }
     }
@@ -152,27 +149,19 @@ impl From<&Settings> for BakeSettings {
 
 /// Refuses settings that no bake can be made with.
 fn check(settings: &BakeSettings) -> Result<()> {
-    let BakeSettings {
-        rings,
-        resolution,
-        occlusion_rays,
-        transfer_bands,
-        transfer_resolution,
-        light_iterations,
-    } = *settings;
+    let BakeSettings { rings, resolution, occlusion_rays, transfer_bands, transfer_resolution } = *settings;
     if !(1..=16).contains(&rings)
         || !(16..=512).contains(&resolution)
         || !resolution.is_power_of_two()
         || occlusion_rays == 0
         || transfer_bands > 2
-        || !(1..=2).contains(&light_iterations)
         || !(8..=resolution).contains(&transfer_resolution)
         || !transfer_resolution.is_power_of_two()
     {
         return Err(Error::Usage(format!(
-            "cannot bake {rings} rings of {resolution} texels with {occlusion_rays} rays, {light_iterations} iterations of light and \
+            "cannot bake {rings} rings of {resolution} texels with {occlusion_rays} rays and \
              {transfer_bands} bands of transfer of {transfer_resolution} texels: 1 to 16 rings, a power of two from 16 to 512 texels, at \
-             least one ray, 1 or 2 iterations, and at most two bands, of a power of two from 8 to the views' texels"
+             least one ray, and at most two bands, of a power of two from 8 to the views' texels"
         )));
     }
     Ok(())
@@ -210,7 +199,7 @@ pub fn bake_views(
     let progress = Progress::new("baking views", u64::from(count), quiet);
     let field = views::draw(&surface, &occlusion, settings.rings, settings.resolution, &progress);
     progress.finish();
-    Ok(optics::species(mesh, &surface, field, optics, settings.light_iterations))
+    Ok(optics::species(mesh, &surface, field, optics))
 }
 
 /// Bakes the light transfer of a species' views, in as many bands as the settings say.
@@ -223,7 +212,6 @@ pub fn bake_transfer(
     settings: &BakeSettings,
     quiet: bool,
 ) -> Result<Transfer> {
-    let BakeSettings { transfer_bands, transfer_resolution, light_iterations, .. } = *settings;
-    let how = (transfer_bands, transfer_resolution, light_iterations);
+    let how = (settings.transfer_bands, settings.transfer_resolution);
     Ok(transfer::draw(mesh, &Surface::new(mesh)?, bake, how, quiet))
 }

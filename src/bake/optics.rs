@@ -162,15 +162,8 @@ fn colours_of(leaves: &Leaves, stated: &OpticsOverride) -> Colours {
     }
 }
 
-/// Puts views and measurements together; what the scene states wins over what the mesh shows. Self-shadow is measured for
-/// a number of iterations of the light ray.
-pub fn species(
-    mesh: &Mesh,
-    surface: &Surface,
-    views: ZField,
-    stated: &OpticsOverride,
-    light_iterations: u32,
-) -> SpeciesBake {
+/// Puts views and measurements together; what the scene states wins over what the mesh shows.
+pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOverride) -> SpeciesBake {
     let leaves = leaves(mesh, surface);
     let frame = surface.frame;
     // A tree without foliage: all of it stands for leaves.
@@ -179,7 +172,7 @@ pub fn species(
     let luminances = [colours.reflectance, colours.transmittance, colours.bark_reflectance].map(luminance);
     let matter = self_shadow::Matter { foliage: &foliage, base: leaves.base, luminances };
     let self_shadow::Measured { shadow, turned, corrections: [lit, sent] } =
-        self_shadow::measure(surface, &matter, &views, light_iterations);
+        self_shadow::measure(surface, &matter, &views);
     let [leaf_shadow, extinction] = shadow.map(|x| x as f32);
     let area = top_area(&views) * f64::from(frame.half_width).powi(2);
     SpeciesBake {

@@ -178,18 +178,18 @@ impl Scatter {
     }
 }
 
-/// The transfer of all views of a species: bands, texels a side of a view, and iterations of the light ray.
+/// The transfer of all views of a species: bands, and texels a side of a view.
 pub fn draw(
     mesh: &Mesh,
     surface: &Surface,
     bake: &SpeciesBake,
-    (bands, resolution, light_iterations): (u32, u32, u32),
+    (bands, resolution): (u32, u32),
     quiet: bool,
 ) -> Transfer {
     if bands == 0 {
         return Transfer::default();
     }
-    let field = FieldCrown::new(bake, FIELD, 1, light_iterations);
+    let field = FieldCrown::new(bake, FIELD, 1, 1);
     let suns = suns(surface, &field);
     let points = Points::new(surface, &suns, resolution, quiet);
     let scatter = Scatter::new(mesh, surface, bake);

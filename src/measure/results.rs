@@ -112,7 +112,6 @@ impl SceneIdentity {
             resolution: 16,
             occlusion_rays: 8,
             transfer_bands: 0,
-            light_iterations: 1,
             transfer_resolution: 8,
         };
         for s in &scene.species {

@@ -247,9 +247,14 @@ mod tests {
         let two = some(&["view_rings=6/9/12", "samples=1/4"]);
         let names = |s: &Setting| s.name.clone();
         let all: Vec<String> = one_at_a_time(&bases(), &two).unwrap().iter().map(names).collect();
-        let moved = ["balanced view_rings=6", "balanced view_rings=9", "balanced samples=1"];
+        let moved = [
+            "balanced view_rings=6",
+            "balanced view_rings=9",
+            "balanced view_rings=12",
+            "balanced samples=1",
+        ];
         assert_eq!(all, [&["balanced", "fast", "accurate"][..], &moved].concat());
-        // The preset `accurate` has more samples.
+        // The preset `accurate` has more rings and samples.
         let finest = most_accurate(&bases(), &two).unwrap();
         assert_eq!((finest.view_rings, finest.samples), (12, 8));
         assert_eq!([two[0].label(), some(&["samples"])[0].label()], ["view_rings=6/9/12", "samples"]);
