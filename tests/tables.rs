@@ -77,6 +77,7 @@ const SMALL: ForestSettings = ForestSettings {
     scale_range: [1.0, 1.0],
     poisson: true,
     hole_radius: 0.0,
+    light_iterations: 1,
     view_iterations: 2,
 };
 
