@@ -234,7 +234,6 @@ struct MeshKind {
     vec3 half_box;                    // half extents of the tree's box, m
     float card_side;                  // of a square of a leaf card's mean area, m
     uint tree_count;                  // trees in view that are meshes: each frame's
-    uint first_tree;                  // in the list of trees that are meshes: each frame's
     uint first_face;                  // of all meshes' triangles
     uint face_count;                  // triangles of the whole model, in their own order
     uint first_name;                  // of its triangles' random numbers, which levels have no part in

@@ -119,6 +119,11 @@ impl Settings {
         self.transfer_resolution.min(self.view_resolution)
     }
 
+    /// Levels by which these texels are larger than the view's.
+    pub fn transfer_levels(&self) -> u32 {
+        (self.view_resolution / self.transfer_side()).ilog2()
+    }
+
     /// All knobs at a preset's values; `None` if there is no such preset.
     pub fn preset(name: &str) -> Option<Self> {
         PRESETS.iter().position(|p| *p == name).map(Settings::at)

@@ -161,7 +161,7 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
 // Light that met more than one surface, of a tree among others of thickness x.
 HandedLight handed_on(Tree t, Species kind, vec3 ground, float x) {
     vec3 l = view.v.sun_direction, to_camera = -normalize(t.centre);
-    int base = INDIRECT_FIRST + int(t.species & TREE_SPECIES) * INDIRECT_NODES * INDIRECT_NODE;
+    int base = INDIRECT_FIRST + int(species_row(t.species)) * INDIRECT_NODES * INDIRECT_NODE;
     IndirectAt at = indirect_at(x, texelFetch(indirect, 0).w, INDIRECT_NODES);
     Handed sun = indirect_near_sun(indirect, base, at, to_camera.z, l.z, dot(to_camera, l)), sky = indirect_near_sky(indirect, base, at, to_camera.z);
     float tint = unpackHalf2x16(t.cascade_tint).y;

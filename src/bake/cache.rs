@@ -2,7 +2,7 @@
 //!
 //! - `.zfield`, the depth views with their occlusion, and the measured crown and optics: of the model and the knobs of views. All
 //!   else is made from these.
-//! - `.transfer`, the light transfer of the views: of these and of the number of bands, whose coefficients are fitted together.
+//! - `.transfer`, the light transfer of the views: of these, of its texels and of the number of bands, whose coefficients are fitted together.
 //! - `.indirect`, light that met more than one surface ([`super::indirect`]): of a forest, its
 //!   models, their reflectances and densities, and the ground.
 //! - `.levels`, coarser meshes ([`super::levels`]): of the model.
@@ -15,7 +15,7 @@ use super::envelope::{Envelopes, Parts, RAYS};
 use super::file::{Fields, Format, load_or_build};
 use super::hiding::HEIGHTS;
 use super::indirect::{self, Mix};
-use super::levels::{BarkLevel, Levels, NewFace, bark};
+use super::levels::{self, Levels};
 use super::surface::Surface;
 use super::{
     BakeSettings, ForestSettings, SpeciesBake, Turned, bake_transfer, bake_views, check, load_or_measure,
@@ -25,7 +25,6 @@ use crate::physics::correction::{Correction, TERMS};
 use crate::physics::crown::{Crown, Frame};
 use crate::physics::indirect::{COEFFICIENTS, Indirect};
 use crate::physics::leaf::Directions;
-use crate::physics::levels::{BARK_LEVELS, OCTAVES};
 use crate::physics::tables::ForestTables;
 use crate::physics::transfer::Transfer;
 use crate::physics::views;
@@ -36,7 +35,6 @@ const VIEWS: Format = Format { magic: *b"CANOPYZF", version: 14, extension: "zfi
 const TRANSFER: Format = Format { magic: *b"CANOPYLT", version: 4, extension: "transfer" };
 const INDIRECT: Format = Format { magic: *b"CANOPYIL", version: 14, extension: "indirect" };
 const ENVELOPES: Format = Format { magic: *b"CANOPYLE", version: 5, extension: "envelopes" };
-const LEVELS: Format = Format { magic: *b"CANOPYLV", version: 2, extension: "levels" };
 /// Numbers at the head of a file of views.
 const SCALARS: usize = 23 + 4 * TERMS;
 
@@ -186,26 +184,7 @@ impl<'a> Source<'a> {
     /// # Errors
     /// [`crate::Error::Usage`] for a mesh without extent.
     pub fn load_levels(&self) -> Result<(Levels, CacheState)> {
-        let surface = Surface::new(self.mesh)?;
-        let whole = Levels::whole(self.mesh, &surface);
-        let (holed, opaque) = bark::parted(&surface, &whole.bark[0].kept);
-        // A level that there is not has no triangles.
-        let sizes = (1..BARK_LEVELS).map(|level| size_of::<NewFace>() * bark::most(opaque.len(), level));
-        load_or_build(
-            (self.dir, &LEVELS, &levels_key(self.mesh)),
-            &std::iter::once(4 * OCTAVES + 8 * BARK_LEVELS).chain(sizes).collect::<Vec<_>>(),
-            |read| decode_levels(&read, whole.clone(), &holed),
-            |built, put| {
-                put(&levels_head(built))?;
-                (1..BARK_LEVELS).try_for_each(|level| {
-                    let mut new = built.bark.get(level).map_or_else(Vec::new, |b| b.new.clone());
-                    new.resize(bark::most(opaque.len(), level), NewFace::default());
-                    put(bytemuck::cast_slice(&new))
-                })
-            },
-            || Ok(Levels::new(self.mesh, &surface)),
-            self.quiet,
-        )
+        levels::file::load(self.mesh, self.dir, self.quiet)
     }
 
     /// The tables of a forest of the species, likewise. Light transfer has a part in them: where they have to be measured, the
@@ -264,11 +243,11 @@ fn transfer_key(views: &[u8; 32], settings: &BakeSettings) -> Option<[u8; 32]> {
 }
 
 /// Numbers of single precision, as they are kept.
-fn floats(bytes: &[u8]) -> Vec<f64> {
+pub(super) fn floats(bytes: &[u8]) -> Vec<f64> {
     bytes.as_chunks::<4>().0.iter().map(|b| f64::from(f32::from_le_bytes(*b))).collect()
 }
 
-fn bytes(floats: &[f64]) -> Vec<u8> {
+pub(super) fn bytes(floats: &[f64]) -> Vec<u8> {
     floats.iter().flat_map(|x| (*x as f32).to_le_bytes()).collect()
 }
 
@@ -280,44 +259,6 @@ fn envelopes_key(mesh: &Mesh, directions: u32) -> [u8; 32] {
     }
     put_mesh(&mut fields, mesh);
     fields.key()
-}
-
-/// BLAKE3 of everything that a mesh's levels of detail depend on.
-fn levels_key(mesh: &Mesh) -> [u8; 32] {
-    let mut fields = Fields::new("canopy mesh levels");
-    fields.put(&LEVELS.version.to_le_bytes());
-    put_mesh(&mut fields, mesh);
-    fields.key()
-}
-
-/// The pull on cards; of each level of bark its triangles and its error.
-fn levels_head(levels: &Levels) -> Vec<u8> {
-    let mut head = bytes(&levels.pull);
-    for level in 0..BARK_LEVELS {
-        let of = levels.bark.get(level).map_or((0, 0.0), |b| (b.new.len() as u32, b.error as f32));
-        head.extend(of.0.to_le_bytes().into_iter().chain(of.1.to_le_bytes()));
-    }
-    head
-}
-
-/// The levels of a file, whose leaves' order and whole bark follow from the mesh.
-fn decode_levels(read: &[Vec<u8>], whole: Levels, holed: &[u32]) -> Levels {
-    let pull = floats(&read[0][..4 * OCTAVES]);
-    let mut levels = Levels { pull: std::array::from_fn(|k| pull[k]), ..whole };
-    for (level, part) in read.iter().enumerate().skip(1) {
-        let [count, error] = [0, 4].map(|at| {
-            let from = 4 * OCTAVES + 8 * level + at;
-            std::array::from_fn::<u8, 4, _>(|k| read[0][from + k])
-        });
-        let count = (u32::from_le_bytes(count) as usize).min(part.len() / size_of::<NewFace>());
-        if count == 0 {
-            break;
-        }
-        let new = bytemuck::pod_collect_to_vec(&part[..count * size_of::<NewFace>()]);
-        let error = f64::from(f32::from_le_bytes(error));
-        levels.bark.push(BarkLevel { kept: holed.to_vec(), new, error });
-    }
-    levels
 }
 
 /// Light that met more than one surface, of a species of a forest, from the cache if it is there, else measured and put there.
@@ -382,7 +323,7 @@ pub fn views_key(mesh: &Mesh, optics: &OpticsOverride, settings: &BakeSettings) 
 }
 
 /// Geometry, masks and colours of a mesh.
-fn put_mesh(fields: &mut Fields, mesh: &Mesh) {
+pub(super) fn put_mesh(fields: &mut Fields, mesh: &Mesh) {
     let mut put = |bytes: &[u8]| fields.put(bytes);
     put(bytemuck::cast_slice(&mesh.positions));
     put(bytemuck::cast_slice(&mesh.uvs));

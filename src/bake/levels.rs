@@ -1,9 +1,10 @@
 //! Levels of detail of a species' mesh: the order in which its leaves are thinned, coarser bark, and how much wider fewer leaves have to be
 //! (`src/physics/levels.rs` has the laws by which they are chosen).
 
-pub(super) mod bark;
+mod bark;
 mod cards;
 mod coverage;
+pub(super) mod file;
 mod nearest;
 mod verify;
 
@@ -14,7 +15,7 @@ pub use verify::{Agreement, LevelQuality, Seen, verify};
 use glam::Vec3;
 
 use super::surface::{Face, Surface};
-use crate::physics::levels::{OCTAVES, card_scale, card_weight};
+use crate::physics::levels::{OCTAVES, card_scale};
 use crate::scene::Mesh;
 
 /// A species' levels of detail.
@@ -31,14 +32,18 @@ pub struct Levels {
 impl Levels {
     /// Makes them; the same bits on any number of threads.
     pub fn new(mesh: &Mesh, surface: &Surface) -> Self {
-        let mut levels = Levels::whole(mesh, surface);
-        levels.bark.extend(bark::simplified(surface, &levels.bark[0].kept));
-        levels.pull = coverage::pull(surface, &levels);
-        levels
+        Levels::whole(mesh, surface).completed(surface)
+    }
+
+    /// What the whole is made coarser to.
+    fn completed(mut self, surface: &Surface) -> Self {
+        self.bark.extend(bark::simplified(surface, &self.bark[0].kept));
+        self.pull = coverage::pull(surface, &self);
+        self
     }
 
     /// The leaves' order, and the whole bark alone.
-    pub(super) fn whole(mesh: &Mesh, surface: &Surface) -> Self {
+    fn whole(mesh: &Mesh, surface: &Surface) -> Self {
         let cards = Cards::new(mesh, surface);
         // Ranks of leaves are above 0.
         let kept = (0u32..).zip(&cards.rank).filter(|(_, rank)| **rank == 0.0).map(|(k, _)| k).collect();
@@ -51,8 +56,8 @@ impl Levels {
         let (mut faces, mut like) = (Vec::new(), Vec::new());
         for k in &self.cards.order {
             let rank = f64::from(self.cards.rank[*k as usize]);
-            if card_weight(rank, share) > 0.0 {
-                let scale = card_scale(rank, share) as f32;
+            let scale = card_scale(rank, share) as f32;
+            if scale > 0.0 {
                 let (middle, face) = (self.cards.middle[*k as usize], &surface.faces[*k as usize]);
                 let to = self.cards.centre + (middle - self.cards.centre) * pull as f32;
                 let moved = |p: Vec3| if share < 1.0 { to + (p - middle) * scale } else { p };

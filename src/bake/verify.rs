@@ -76,18 +76,9 @@ pub fn verify(mesh: &Mesh, bake: &SpeciesBake, directions: u32, iterations: u32)
     Ok(QualityReport { views })
 }
 
-/// An unending spiral of directions over the upper hemisphere (additive recurrence of the golden ratio and
-/// its square, equal solid angles), less those too near to an edge of the view triangles.
+/// [`views::spread`], less those too near to an edge of the view triangles.
 fn between(n: u32) -> impl Iterator<Item = DVec3> {
-    (0u64..)
-        .map(|k| {
-            let k = k as f64 + 0.5;
-            let z = (k * 0.754_877_666_246_692_7).fract();
-            let (s, c) = (std::f64::consts::TAU * (k * 0.569_840_290_998_053_2).fract()).sin_cos();
-            let r = (1.0 - z * z).sqrt();
-            DVec3::new(r * c, r * s, z)
-        })
-        .filter(move |w| views::lookup(n, *w).views.iter().all(|v| v.weight > 0.1))
+    views::spread().filter(move |w| views::lookup(n, *w).views.iter().all(|v| v.weight > 0.1))
 }
 
 fn view(

@@ -1,10 +1,11 @@
 //! `canopy bake`.
 
+mod as_mesh;
+
 use std::path::PathBuf;
 use std::time::Instant;
 
 use canopy::Result;
-use canopy::bake::levels::{LevelQuality, Seen};
 use canopy::bake::tables::{self, ForestSettings};
 use canopy::bake::{self, BakeSettings, CacheState, Needs, Source, SpeciesBake, cache};
 use canopy::scene::{Mesh, OpticsOverride};
@@ -27,9 +28,6 @@ Examples:
 Bakes are kept in $CANOPY_CACHE, else $XDG_CACHE_HOME/canopy, else ~/.cache/canopy: views (.zfield), light transfer (.transfer), crowns
 around leaves (.envelopes), levels of detail (.levels), light of all orders (.indirect) and tables (.forest) apart. Of each it is said whether it was read from there (hit), baked, or baked again because the file
 was damaged (rebuilt).";
-
-/// Directions from which levels of detail are compared, at least.
-const LEAST_DIRECTIONS: u32 = 24;
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{}", knobs_help()))]
@@ -107,23 +105,6 @@ struct Forest {
     samples: Vec<[f64; 3]>,
 }
 
-/// What drawing a species as a mesh takes.
-#[derive(serde::Serialize)]
-struct AsMesh {
-    directions: u32,
-    envelopes: &'static str,
-    levels: &'static str,
-    seconds: f64,
-    cards: usize,
-    card_side_m: f64,
-    /// Factors of how far cards are from the middle of all leaves, for u = 1, 1/2, 1/4 and so on.
-    pull: Vec<f64>,
-    /// Triangles and error, m, of each level of bark.
-    bark: Vec<(usize, f64)>,
-    /// With `--verify`.
-    verify: Vec<LevelQuality>,
-}
-
 /// Where from the rest came that a scene's species are drawn with.
 #[derive(serde::Serialize)]
 struct Ahead {
@@ -147,7 +128,7 @@ struct Baked {
     optics: Optics,
     verify: Vec<Quality>,
     forest: Option<Forest>,
-    mesh: Option<AsMesh>,
+    mesh: Option<as_mesh::AsMesh>,
     ahead: Option<Ahead>,
 }
 
@@ -225,7 +206,8 @@ fn one(
         |density| forest(&source, (&mut bake, state), ForestSettings::new(settings, density, scale, false));
     let forest = args.forest.map(tables).transpose()?;
     let mesh_too = args.ahead || args.verify.is_some();
-    let as_mesh = mesh_too.then(|| as_mesh(args, &source, (mesh, &bake), settings)).transpose()?;
+    let mesh_takes =
+        mesh_too.then(|| as_mesh::as_mesh(args.verify, &source, (mesh, &bake), settings)).transpose()?;
     Ok(Baked {
         name,
         triangles: mesh.triangles.len(),
@@ -247,7 +229,7 @@ fn one(
         },
         verify,
         forest,
-        mesh: as_mesh,
+        mesh: mesh_takes,
         ahead: None,
     })
 }
@@ -282,34 +264,6 @@ fn forest(
         ground_error: t.pair_stderr.iter().map(|e| e[0]).fold(0.0, f32::max),
         tree_light_error: t.pair_stderr.iter().map(|e| e[1]).fold(0.0, f32::max),
         samples: [0.0, 30.0, 60.0, 80.0].map(sample).to_vec(),
-    })
-}
-
-/// Makes what a mesh takes, or reads it, and compares its levels of detail if asked.
-fn as_mesh(
-    args: &Args,
-    source: &Source,
-    (mesh, bake): (&Mesh, &SpeciesBake),
-    settings: &Settings,
-) -> Result<AsMesh> {
-    let start = Instant::now();
-    let (envelopes, around) = source.load_envelopes(settings.leaf_directions)?;
-    let (levels, from) = source.load_levels()?;
-    let seconds = start.elapsed().as_secs_f64();
-    let seen = Seen { mesh, bake, envelopes: &envelopes, levels: &levels };
-    let directions = |n: u32| n.max(LEAST_DIRECTIONS) as usize;
-    let verify =
-        args.verify.map(|n| bake::levels::verify(&seen, directions(n), f64::from(settings.leaf_pixels)));
-    Ok(AsMesh {
-        directions: settings.leaf_directions,
-        envelopes: around.name(),
-        levels: from.name(),
-        seconds,
-        cards: levels.cards.count,
-        card_side_m: levels.cards.side,
-        pull: levels.pull.to_vec(),
-        bark: levels.bark.iter().map(|b| (b.kept.len() + b.new.len(), b.error)).collect(),
-        verify: verify.transpose()?.unwrap_or_default(),
     })
 }
 
@@ -387,64 +341,8 @@ fn text(b: &Baked) -> String {
         }
         text += &format!("  z-field against mesh, {} directions\n{}", b.verify[0].directions, table.text());
     }
-    text + &b.mesh.as_ref().map_or(String::new(), mesh_text)
+    text + &b.mesh.as_ref().map_or(String::new(), as_mesh::text)
         + &b.ahead.as_ref().map_or(String::new(), ahead_text)
-}
-
-/// What a mesh takes, and its levels of detail.
-fn mesh_text(m: &AsMesh) -> String {
-    let mut table = Table::new(2, &["  as a mesh", ""]);
-    table.row([
-        "  cache: crowns around leaves".into(),
-        format!("{}, {} directions", m.envelopes, m.directions),
-    ]);
-    table.row(["  cache: levels of detail".into(), m.levels.into()]);
-    table.row(["  time".into(), format!("{:.2} s", m.seconds)]);
-    table.row(["  cards of leaves".into(), format!("{} of {:.2} m", m.cards, m.card_side_m)]);
-    for (k, (triangles, error)) in m.bark.iter().enumerate() {
-        table.row([
-            format!("  bark, level {k}"),
-            format!("{triangles} triangles, within {:.1} cm", 100.0 * error),
-        ]);
-    }
-    let text = table.text();
-    if m.verify.is_empty() {
-        return text;
-    }
-    let headings = [
-        "leaves",
-        "tree, px",
-        "triangles",
-        "pull",
-        "bark",
-        "coverage",
-        "worst",
-        "IoU mean",
-        "min",
-        "radiance",
-        "worst",
-    ];
-    let mut table = Table::new(0, &headings);
-    for q in &m.verify {
-        let worst = |part: fn(&bake::levels::Agreement) -> f64| {
-            let [low, high] = q.range.map(|a| part(&a));
-            format!("{:.4}", if 1.0 - low > high - 1.0 { low } else { high })
-        };
-        table.row([
-            format!("{}", q.share),
-            format!("{:.0}", q.height_px),
-            q.leaf_triangles.to_string(),
-            format!("{:.3}", q.pull),
-            format!("{}: {}", q.bark_level, q.bark_triangles),
-            format!("{:.4}", q.mean.coverage),
-            worst(|a| a.coverage),
-            format!("{:.4}", q.mean.iou),
-            format!("{:.4}", q.range[0].iou),
-            format!("{:.4}", q.mean.radiance),
-            worst(|a| a.radiance),
-        ]);
-    }
-    text + "  levels of detail against the whole mesh\n" + &table.text()
 }
 
 fn ahead_text(a: &Ahead) -> String {

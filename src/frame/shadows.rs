@@ -108,9 +108,9 @@ impl Shadows {
             gpu.graphics(&GraphicsDesc { vert, frag, colors: &[], samples: 1, depth, constants })
         };
         let s = &scene.settings;
-        let wind = ("WIND", u32::from(plan.wind));
+        let wind = [("WIND", u32::from(plan.wind))];
         let resolution = (s.view_resolution as f32).to_bits();
-        let views = [("VIEW_RINGS", s.view_rings), ("VIEW_RESOLUTION", resolution), wind];
+        let views = [("VIEW_RINGS", s.view_rings), ("VIEW_RESOLUTION", resolution), wind[0]];
         let chosen = gpu.info().vertex_layers;
         let (ground, trees, meshes) = match chosen {
             true => (
@@ -129,8 +129,8 @@ impl Shadows {
             .then(|| program(ground, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[]));
         let trees =
             (on && plan.z_fields).then(|| program(trees, &shaders::FRAME_TREES_ZFIELD_SHADOW_FRAG, &views));
-        let meshes = (on && plan.meshes)
-            .then(|| program(meshes, &shaders::FRAME_TREES_MESHES_SHADOW_FRAG, &views[2..]));
+        let meshes =
+            (on && plan.meshes).then(|| program(meshes, &shaders::FRAME_TREES_MESHES_SHADOW_FRAG, &wind));
         let side = SHADOW_CELLS + 1;
         let cells = (0..SHADOW_CELLS * SHADOW_CELLS).map(|k| k % SHADOW_CELLS + side * (k / SHADOW_CELLS));
         let indices: Vec<u32> =

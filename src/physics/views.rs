@@ -9,6 +9,17 @@
 use glam::DVec3;
 use std::f64::consts::FRAC_PI_2;
 
+/// An unending spread of directions over the upper hemisphere (additive recurrence of the plane's golden ratio, equal solid angles).
+pub fn spread() -> impl Iterator<Item = DVec3> {
+    (0u64..).map(|k| {
+        let k = k as f64 + 0.5;
+        let z = (k * 0.754_877_666_246_692_7).fract();
+        let (s, c) = (std::f64::consts::TAU * (k * 0.569_840_290_998_053_2).fract()).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        DVec3::new(r * c, r * s, z)
+    })
+}
+
 /// Number of views of a field with `n` rings: 2n(n+1) + 1.
 pub const fn count(n: u32) -> u32 {
     2 * n * (n + 1) + 1

@@ -84,8 +84,17 @@ pub fn small_scene(text: &str) -> Scene {
 
 /// Species of a scene, baked once for all tests and runs.
 pub fn bake(scene: &Scene) -> Vec<Baked> {
+    bake_with(scene, Needs::ALL)
+}
+
+/// The same with what drawing them as meshes takes.
+pub fn bake_meshes(scene: &Scene) -> Vec<Baked> {
+    bake_with(scene, Needs { envelopes: true, ..Needs::ALL })
+}
+
+fn bake_with(scene: &Scene, needs: Needs) -> Vec<Baked> {
     let cache = folder().join("bakes");
-    load_or_bake_scene(scene, Needs::ALL, Some(&cache), true).unwrap().into_iter().map(|(b, _)| b).collect()
+    load_or_bake_scene(scene, needs, Some(&cache), true).unwrap().into_iter().map(|(b, _)| b).collect()
 }
 
 /// Index of a seed's species.

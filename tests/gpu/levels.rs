@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::device;
 use canopy::bake::levels::Levels;
-use canopy::bake::{Baked, Needs, load_or_bake_scene};
+
 use canopy::camera::Eye;
 use canopy::frame::Renderer;
 use canopy::gpu::interface::{DrawCommand, MESH_DRAWS, MeshFace, MeshKind, MeshTree, Tree};
@@ -42,17 +42,11 @@ fn trees(places: &[[f64; 3]], light: &str) -> Scene {
     scene
 }
 
-fn bake(scene: &Scene) -> Vec<Baked> {
-    let needs = Needs { envelopes: true, ..Needs::ALL };
-    let all = load_or_bake_scene(scene, needs, Some(&device::folder().join("bakes")), true).unwrap();
-    all.into_iter().map(|(b, _)| b).collect()
-}
-
 fn renderer(gpu: &Gpu, scene: &Scene, camera: &Camera, size: [u32; 2]) -> Renderer {
     let eye = Eye::new(camera, &scene.terrain, size);
     let plan =
         Plan::for_eye(scene, &eye, true, LADDER.parse::<canopy::ladder::Ladder>().unwrap(), Some(gpu.info()));
-    Renderer::new(gpu, Arc::new(scene.clone()), plan.unwrap(), &bake(scene)).unwrap()
+    Renderer::new(gpu, Arc::new(scene.clone()), plan.unwrap(), &device::bake_meshes(scene)).unwrap()
 }
 
 fn picture(gpu: &Gpu, scene: &Scene, camera: &Camera) -> Picture {
@@ -98,7 +92,7 @@ fn the_device_draws_of_each_tree_what_the_law_says() {
     let count: Vec<u32> = gpu.read(&data.draw_count, 0, 1).unwrap();
     assert_eq!(count[0] as usize, draws.len());
     let trees: Vec<Tree> = gpu.read(&near.cull.trees, 0, report.trees.camera as usize).unwrap();
-    let baked = bake(&scene);
+    let baked = device::bake_meshes(&scene);
     let (mut whole, mut bark_levels) = (0, std::collections::BTreeSet::new());
     let mut distances: Vec<[f64; 2]> = Vec::new();
     for (place, t) in shown.iter().enumerate() {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::device::{self, Arguments, Function, evaluate};
-use canopy::bake::{Baked, Needs, load_or_bake_scene};
+
 use canopy::camera::Eye;
 use canopy::frame::{FrameReport, Renderer};
 use canopy::gpu::Gpu;
@@ -36,12 +36,6 @@ fn oaks(places: &[[f64; 3]], light: &str) -> Scene {
     scene
 }
 
-fn bake(scene: &Scene) -> Vec<Baked> {
-    let cache = device::folder().join("bakes");
-    let needs = Needs { envelopes: true, ..Needs::ALL };
-    load_or_bake_scene(scene, needs, Some(&cache), true).unwrap().into_iter().map(|(b, _)| b).collect()
-}
-
 fn plan(gpu: &Gpu, scene: &Scene, camera: &Camera, drawing: impl Into<Drawing>, layers: bool) -> Plan {
     let eye = Eye::new(camera, &scene.terrain, SIZE);
     Plan::for_eye(scene, &eye, layers, drawing, Some(gpu.info())).unwrap()
@@ -54,7 +48,8 @@ fn draw(gpu: &Gpu, scene: &Scene, camera: &Camera, by: &str) -> (FrameReport, Pi
 fn draw_at(gpu: &Gpu, scene: &Scene, camera: &Camera, by: &str, size: [u32; 2]) -> (FrameReport, Picture) {
     let eye = Eye::new(camera, &scene.terrain, size);
     let plan = Plan::for_eye(scene, &eye, true, ladder(by), Some(gpu.info())).unwrap();
-    let mut renderer = Renderer::new(gpu, Arc::new(scene.clone()), plan, &bake(scene)).unwrap();
+    let mut renderer =
+        Renderer::new(gpu, Arc::new(scene.clone()), plan, &device::bake_meshes(scene)).unwrap();
     let report = renderer.render(camera, 1.0).unwrap();
     let picture = renderer.picture().unwrap();
     let l = picture.linear.as_ref().unwrap();
@@ -218,7 +213,8 @@ fn frames_of_meshes_are_the_same_bits_whatever_came_before() {
     ];
     let alone = cameras.clone().map(|c| draw(&gpu, &scene, &c, NEAR).1);
     let all = plan(&gpu, &scene, &cameras[0], ladder(NEAR), true);
-    let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), all, &bake(&scene)).unwrap();
+    let mut renderer =
+        Renderer::new(&gpu, Arc::new(scene.clone()), all, &device::bake_meshes(&scene)).unwrap();
     for k in [0, 1, 1, 0, 1] {
         renderer.render(&cameras[k], 1.0).unwrap();
         assert_eq!(renderer.picture().unwrap(), alone[k], "camera {k}");
@@ -236,7 +232,8 @@ fn every_view_mode_and_one_sample_a_pixel_show_meshes() {
         let mut modes = plan(&gpu, &scene, &camera, ladder(NEAR), false);
         modes.view_mode = mode;
         modes.list(&scene);
-        let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), modes, &bake(&scene)).unwrap();
+        let mut renderer =
+            Renderer::new(&gpu, Arc::new(scene.clone()), modes, &device::bake_meshes(&scene)).unwrap();
         renderer.render(&camera, 1.0).unwrap();
         let shown = renderer.picture().unwrap().display;
         // Of the coverage mode the ground alone is shown; all others show the crown in the middle in a colour that the corners do not have.
@@ -273,7 +270,8 @@ fn what_meshes_take_is_planned_and_what_they_cannot_be_is_refused() {
     let graphics = refused(Drawing { ladder: Some(ladder(NEAR)), rasterizer: Some(Rasterizer::Graphics) });
     assert!(graphics.contains("--rasterizer tiles"), "{graphics}");
     // A camera that comes nearer than the plan was made for is told so.
-    let mut renderer = Renderer::new(&gpu, Arc::new(scene.clone()), of(&far, NEAR), &bake(&scene)).unwrap();
+    let mut renderer =
+        Renderer::new(&gpu, Arc::new(scene.clone()), of(&far, NEAR), &device::bake_meshes(&scene)).unwrap();
     let e = renderer.render(&near, 1.0).unwrap_err().to_string();
     assert!(e.contains("plan again"), "{e}");
     drop(renderer);
@@ -285,7 +283,8 @@ fn what_meshes_take_is_planned_and_what_they_cannot_be_is_refused() {
     let eye = Eye::looking([47.5, 47.5, 40.0], [0.0, 0.01, -1.0], 50.0, [1600, 1600]);
     let plan =
         Plan::for_eye(&many, &eye, false, ladder("mesh:16,zfield:4,shader-map"), Some(gpu.info())).unwrap();
-    let mut renderer = Renderer::new(&gpu, Arc::new(many.clone()), plan, &bake(&many)).unwrap();
+    let mut renderer =
+        Renderer::new(&gpu, Arc::new(many.clone()), plan, &device::bake_meshes(&many)).unwrap();
     let e = renderer.render(&above, 1.0).unwrap_err().to_string();
     assert!(e.contains("raise mesh_min_pixels"), "{e}");
     drop(renderer);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::device::{self, Worst};
-use canopy::bake::{Baked, Needs, load_or_bake_scene};
+
 use canopy::camera::Eye;
 use canopy::frame::Renderer;
 use canopy::gpu::{Gpu, Resource, shaders};
@@ -41,11 +41,7 @@ fn renderer(gpu: &Gpu, scene: &Scene, camera: &Camera, by: &str, rasterizer: Opt
     let eye = Eye::new(camera, &scene.terrain, SIZE);
     let drawing = Drawing { ladder: Some(by.parse().unwrap()), rasterizer };
     let plan = Plan::for_eye(scene, &eye, true, drawing, Some(gpu.info())).unwrap();
-    let needs = Needs { envelopes: true, ..Needs::ALL };
-    let cache = device::folder().join("bakes");
-    let baked: Vec<Baked> =
-        load_or_bake_scene(scene, needs, Some(&cache), true).unwrap().into_iter().map(|(b, _)| b).collect();
-    Renderer::new(gpu, Arc::new(scene.clone()), plan, &baked).unwrap()
+    Renderer::new(gpu, Arc::new(scene.clone()), plan, &device::bake_meshes(scene)).unwrap()
 }
 
 fn at(renderer: &mut Renderer, camera: &Camera, time: f64) -> Picture {

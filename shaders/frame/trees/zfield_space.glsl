@@ -63,9 +63,6 @@ vec3 rotated(vec2 turn, vec3 m) { return vec3(turn.x * m.x - turn.y * m.y, turn.
 // Rotation back by the tree's turn.
 mat3 tree_rotation(Tree t) { return rotation_back(t.turn); }
 
-// The row of its species.
-uint species_row(uint word) { return word & TREE_SPECIES; }
-
 // A vector of the world in the tree's own axes, as if the tree stood still.
 vec3 resting(Tree t, vec3 d) { return unswayed(t.species, tree_rotation(t) * d); }
 

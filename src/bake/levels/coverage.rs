@@ -7,7 +7,7 @@ use super::Levels;
 use crate::bake::raster::{NO_FACE, Raster, View};
 use crate::bake::surface::Surface;
 use crate::physics::levels::{OCTAVES, bark_level};
-use crate::physics::views::Basis;
+use crate::physics::views::{Basis, spread};
 
 /// Directions from which it is measured: of the upper hemisphere, because from the opposite side a tree covers the same.
 const DIRECTIONS: usize = 24;
@@ -22,18 +22,6 @@ const STEPS: usize = 3;
 /// Least and most of it.
 const BOUNDS: [f64; 2] = [0.3, 1.3];
 
-/// Directions over the upper hemisphere of equal solid angles (additive recurrence of the plane's golden ratio).
-pub(super) fn spread(count: usize) -> Vec<DVec3> {
-    let of = |k: usize| {
-        let k = k as f64 + 0.5;
-        let z = (k * 0.754_877_666_246_692_7).fract();
-        let (s, c) = (std::f64::consts::TAU * (k * 0.569_840_290_998_053_2).fract()).sin_cos();
-        let r = (1.0 - z * z).sqrt();
-        DVec3::new(r * c, r * s, z)
-    };
-    (0..count).map(of).collect()
-}
-
 /// The nearest face that each sample of a picture of `resolution`² texels shows from a direction in scaled tree space.
 pub(super) fn silhouette<'a>(
     surface: &Surface,
@@ -47,13 +35,18 @@ pub(super) fn silhouette<'a>(
     &raster.faces
 }
 
+/// The first directions of [`spread`].
+pub(super) fn directions(count: usize) -> Vec<DVec3> {
+    spread().take(count).collect()
+}
+
 /// Samples that a surface covers from each direction.
 fn covered(surface: &Surface) -> Vec<u32> {
     let count = |raster: &mut Raster, w: DVec3| {
         let seen = silhouette(surface, w, RESOLUTION, raster);
         seen.iter().filter(|f| **f != NO_FACE).count() as u32
     };
-    spread(DIRECTIONS).into_par_iter().map_init(|| Raster::new(RESOLUTION), count).collect()
+    directions(DIRECTIONS).into_par_iter().map_init(|| Raster::new(RESOLUTION), count).collect()
 }
 
 /// Mean over directions of what is covered over what is covered of the whole.

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Levels;
-use super::coverage::{MARGIN, silhouette, spread};
+use super::coverage::{self, MARGIN, silhouette};
 use crate::bake::SpeciesBake;
 use crate::bake::envelope::Envelopes;
 use crate::bake::raster::{NO_FACE, Raster, SUBSAMPLES};
@@ -112,7 +112,7 @@ fn level(
     };
     let rasters = || [Raster::new(resolution), Raster::new(resolution)];
     let each: Vec<Agreement> =
-        spread(directions).into_par_iter().map_init(rasters, |r, w| compare(r, w)).collect();
+        coverage::directions(directions).into_par_iter().map_init(rasters, |r, w| compare(r, w)).collect();
     let bark_triangles = levels.bark[bark].kept.len() + levels.bark[bark].new.len();
     LevelQuality {
         share,

@@ -130,7 +130,7 @@ impl TreeTiles {
                     ("LIGHT_ITERATIONS", if plan.sun { s.light_iterations } else { 0 }),
                     ("HAS_SUN", u32::from(plan.sun)),
                     ("TRANSFER_BANDS", plan.transfer_bands),
-                    ("TRANSFER_LEVELS", (s.view_resolution / s.transfer_side()).ilog2()),
+                    ("TRANSFER_LEVELS", s.transfer_levels()),
                     ("INDIRECT", u32::from(plan.indirect > 0)),
                     wind,
                     ("VIEW_MODE", plan.view_mode as u32),

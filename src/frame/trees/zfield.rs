@@ -42,7 +42,7 @@ impl Trees {
                 ("MAGNIFIED", u32::from(magnified)),
                 ("CONVERGED", u32::from(converged)),
                 ("TRANSFER_BANDS", plan.transfer_bands),
-                ("TRANSFER_LEVELS", (s.view_resolution / s.transfer_side()).ilog2()),
+                ("TRANSFER_LEVELS", s.transfer_levels()),
                 ("INDIRECT", u32::from(plan.indirect > 0)),
                 ("WIND", u32::from(plan.wind)),
             ];

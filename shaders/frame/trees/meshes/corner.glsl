@@ -9,6 +9,7 @@ vec2 corner_uv(uvec4 corner) { return vec2(corner.w & 0xffffu, corner.w >> 16u) 
 // Middle of a leaf, from its 10 bits along each axis of the tree's box.
 vec3 leaf_middle(uint bits, vec3 box) { return (vec3(uvec3(bits, bits >> 10u, bits >> 20u) & 1023u) * (2.0 / 1023.0) - 1.0) * box; }
 
+bool is_leaf(uvec4 face) { return (face.y & 1u) != 0u; }
 bool turns_in_wind(uvec4 face) { return (face.y & 2u) != 0u; }
 
 // A place of a leaf that the wind has turned about the leaf's middle, in the model's own axes; of others, as it is. `face` is the triangle (MeshFace), `name` the

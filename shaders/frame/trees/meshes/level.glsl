@@ -3,7 +3,7 @@
 // frame/trees/meshes/corner.glsl.
 
 vec3 levelled(vec3 place, uvec4 face, MeshTree shown, vec3 box, vec3 all) {
-    bool moved = face.y != 0u && shown.share < 1.0;
+    bool moved = is_leaf(face) && shown.share < 1.0;
     vec3 middle = leaf_middle(face.w, box);
     return moved ? mix(all, middle, shown.pull) + (place - middle) * card_scale(uintBitsToFloat(face.z), shown.share) : place;
 }

@@ -100,7 +100,7 @@ Shown shade(uint what, vec3 world) {
         c = blown(m, t.species, name, is, kind.scale_to_metres, c);
     }
     vec3 n = normalize(cross(b - a, c - a));
-    bool leaf = (is.y & 1u) != 0u;
+    bool leaf = is_leaf(is);
     // Bark has one side, that which is seen.
     if (!leaf && dot(n, viewer) < 0.0) n = -n;
     vec3 reflectance = optics.items[3u * row + (leaf ? 0u : 2u)].rgb, transmittance = leaf ? optics.items[3u * row + 1u].rgb : vec3(0.0);

@@ -84,7 +84,6 @@ void main() {
     if (thread == 0u) {
         uint total = 0u;
         for (uint k = 0u; k < p.species_count; k++) {
-            kinds.items[k].first_tree = total;
             kinds.items[k].tree_count = found[k];
             total += found[k];
         }

@@ -27,7 +27,7 @@ void main() {
     for (uint k = lane * part; k < last; k++) {
         uint tree = lists.items[k];
         uint word = trees.items[tree].species;
-        vec3 extent = species.items[word & TREE_SPECIES].scale_to_metres * trees.items[tree].scale;
+        vec3 extent = species.items[species_row(word)].scale_to_metres * trees.items[tree].scale;
         float support = extent.x * length(forward.xy) + extent.z * abs(forward.z);
         // A sheared cylinder reaches farther.
         if (WIND) support += extent.z * length(forward.xy) * length(unpack_sway(word));
