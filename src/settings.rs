@@ -92,8 +92,8 @@ knobs! {
     silhouette_min_pixels: f32, "px", 0.25..=64.0, [1.0, 1.0, 1.0], draw [2.0, 1.0, 0.5], "apparent height under which trees on the silhouettes of ridges are no longer drawn either; from zfield_min_pixels on they are as others";
     zfield_max_trees: u32, "", 1..=16000000, [1000000, 2000000, 4000000], draw [], "most trees drawn one by one; bounds memory";
     cascades: u32, "", 1..=4, [3, 4, 4], draw [1, 2, 3, 4], "shadow cascades; each draws the trees of its slice again";
-    cascade_size: u32, "texels", 64..=8192, [512, 1024, 4096], draw [256, 512, 1024, 2048, 4096], "texels a side of a cascade; fill cost";
-    cascade_split: f32, "", 0.0..=1.0, [0.95, 0.95, 0.95], draw [0.5, 0.8, 0.95, 0.99], "0 uniform, 1 logarithmic cascade ranges (parallel-split)";
+    cascade_size: u32, "texels", 64..=8192, [512, 2048, 4096], draw [256, 512, 1024, 2048, 4096], "texels a side of a cascade; fill cost";
+    cascade_split: f32, "", 0.0..=1.0, [0.99, 0.99, 0.99], draw [0.5, 0.8, 0.95, 0.99], "0 uniform, 1 logarithmic cascade ranges (parallel-split)";
     shadow_distance: f32, "m", 0.0..=1000000.0, [0.0, 0.0, 0.0], draw [], "range of the cascades; 0 is as far as light has not converged";
     coverage_size: u32, "texels", 32..=1024, [128, 256, 512], draw [64, 128, 256, 512], "texels a side of the coverage tile of a terrain quad; memory and the time to make one grow with the square";
     terrain_pixels: f32, "px", 1.0..=64.0, [12.0, 8.0, 4.0], draw [20.0, 12.0, 8.0, 4.0, 2.0], "size of a terrain mesh cell on the screen; vertices grow with the inverse square";
