@@ -137,6 +137,38 @@ fn texture_transforms_are_applied() {
     }
 }
 
+/// What goes through leaves, from the extension, required or not; what cannot be meant is refused.
+#[test]
+fn diffuse_transmission_is_read() {
+    let with = |value: Value| {
+        changed(|d, _| {
+            d["extensionsRequired"] = json!(["KHR_materials_diffuse_transmission"]);
+            d["materials"][0]["extensions"] = json!({"KHR_materials_diffuse_transmission": value});
+        })
+    };
+    let mesh = read(&with(json!({
+        "diffuseTransmissionFactor": 0.25, "diffuseTransmissionColorFactor": [0.4, 0.8, 0.2],
+        "diffuseTransmissionColorTexture": {"index": 0}})))
+    .unwrap();
+    let t = mesh.materials[0].transmission.as_ref().unwrap();
+    assert_eq!((t.factor, t.color), (0.25, [0.4, 0.8, 0.2]));
+    assert!(t.factor_texture.is_none());
+    assert_eq!(t.color_texture.as_ref().unwrap().width, 2);
+    let defaults = read(&with(json!({}))).unwrap();
+    let t = defaults.materials[0].transmission.as_ref().unwrap();
+    assert_eq!((t.factor, t.color), (0.0, [1.0; 3]));
+    assert!(read(&changed(|_, _| ())).unwrap().materials[0].transmission.is_none());
+    for (what, value) in [
+        ("a factor is 2, not 0 to 1", json!({"diffuseTransmissionFactor": 2.0})),
+        ("textures[9] is not there", json!({"diffuseTransmissionTexture": {"index": 9}})),
+        ("other texture coordinates", json!({"diffuseTransmissionTexture": {"index": 0, "texCoord": 1}})),
+        ("invalid type", json!({"diffuseTransmissionFactor": "half"})),
+    ] {
+        let e = read(&with(value)).unwrap_err().to_string();
+        assert!(e.contains(what) && e.contains("material \"leaf\""), "{e}");
+    }
+}
+
 #[test]
 fn other_layouts_load() {
     for (what, change) in [

@@ -79,7 +79,7 @@ void main() {
         kind = species.items[s.species_density & 0xffffu];
         place = caster_place(b, q, s, kind);
         precise float radius = kind.bounding_radius * s.scale;
-        casts = any_drawn(b, caster_pages(b, place, radius));
+        casts = any_drawn(b, caster_pages(b, place, radius, VIEW_RESOLUTION));
     }
     if (casts) atomicOr(members[word], bit);
     barrier();

@@ -16,10 +16,13 @@ vec3 caster_place(ShadowBlock b, CasterQuad q, Seed s, Species kind) {
     return place;
 }
 
-// The pages of the block that what lies around a place may touch: first and last, none if there is a last before a first.
-ivec4 caster_pages(ShadowBlock b, vec3 place, float radius) {
-    // Two texels more: quads are half a texel of their view larger, which is up to 1.4 of the map's.
-    precise float reach = radius * b.texels_per_metre + 2.0;
+// The pages of the block that what lies around a place may touch, of a species with views of so many texels: first and last, none if there is a last before
+// a first.
+ivec4 caster_pages(ShadowBlock b, vec3 place, float radius, float resolution) {
+    // Quads are half a texel of their view larger, and on a slant that is sqrt 2 of a half. Of the mip in use that is up to two texels of the map; where the map is
+    // finer than the finest mip, half of 2 radius / resolution.
+    precise float around = radius * b.texels_per_metre;
+    precise float reach = around + max(2.0, 1.5 * around / resolution);
     precise vec4 pages = vec4(place.xy - reach, place.xy + reach) * b.pages_per_texel;
     // Clamped before they are integers: far away there are more than those hold.
     pages = clamp(floor(pages), vec4(vec2(b.first) - 1.0, vec2(b.first) - 1.0), vec4(b.last, b.last));

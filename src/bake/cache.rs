@@ -338,6 +338,14 @@ pub(super) fn put_mesh(fields: &mut Fields, mesh: &Mesh) {
             m.texture.as_ref().map_or(([0; 2], &[]), |t| ([t.width, t.height], &t.rgba));
         put(bytemuck::bytes_of(&size));
         put(rgba);
+        if let Some(t) = &m.transmission {
+            put(b"transmission");
+            put(bytemuck::bytes_of(&t.factor));
+            put(bytemuck::bytes_of(&t.color));
+            for texture in [&t.factor_texture, &t.color_texture] {
+                put(texture.as_ref().map_or(&[], |t| &t.rgba));
+            }
+        }
     }
 }
 

@@ -2,12 +2,14 @@
 //!
 //! - Self-shadow, c and τ of [`crate::physics::light::self_shadow`], and how leaves are turned, κ: see [`super::self_shadow`].
 //! - Albedo: leaf reflectance r is the mean linear colour of the foliage's opaque texels times the material's
-//!   factor; transmittance t is r/2 unless the scene states it; ρ = r + t. Measured broad leaves have t a
+//!   factor; transmittance t is r/2 unless the scene or the model states it; ρ = r + t. Measured broad leaves have t a
 //!   little below r in the visible range and needles well below, and base colour textures carry no
 //!   transmittance at all; r/2 lies between, and keeps ρ < 1 for every r < 2/3.
+//! - A material with KHR_materials_diffuse_transmission, of a share f and a colour c: r = (1 − f) base colour, t = f c, texel by texel.
 //! - A tree without foliage: all of its surface stands for leaves, with the bark's colour and t = 0.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
@@ -31,8 +33,10 @@ pub struct Leaves {
     pub foliage: bool,
     /// One-sided area, m².
     pub area: f64,
-    /// Mean linear colour.
+    /// Mean reflectance, linear RGB.
     pub color: [f64; 3],
+    /// Mean transmittance, if any of its materials states one; of others it is half of their reflectance.
+    pub transmittance: Option<[f64; 3]>,
     /// Height under which 2 % of the area lie, m.
     pub base: f32,
     /// Mean linear colour of everything that is not foliage; that of the leaves where all is.
@@ -42,8 +46,9 @@ pub struct Leaves {
 /// Measures leaf area, colours and base height.
 pub fn leaves(mesh: &Mesh, surface: &Surface) -> Leaves {
     let foliage = surface.faces.iter().any(|f| mesh.materials[f.material as usize].foliage);
-    let (area, color, mut heights) = measure(mesh, surface, |m| !foliage || m.foliage);
-    let (bark_area, bark, _) = measure(mesh, surface, |m| !m.foliage);
+    let Measured { area, color, transmittance, mut heights } =
+        measure(mesh, surface, |m| !foliage || m.foliage);
+    let bark = measure(mesh, surface, |m| !m.foliage);
     heights.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut below = 0.0;
     let base = heights.iter().find(|(_, a)| {
@@ -54,19 +59,26 @@ pub fn leaves(mesh: &Mesh, surface: &Surface) -> Leaves {
         foliage,
         area,
         color,
+        transmittance,
         base: base.map_or(0.0, |b| b.0),
-        bark: if bark_area > 0.0 { bark } else { color },
+        bark: if bark.area > 0.0 { bark.color } else { color },
     }
 }
 
-/// Area, mean linear colour, and (height, area) of each part, of the surface of some materials.
-fn measure(
-    mesh: &Mesh,
-    surface: &Surface,
-    keep: impl Fn(&Material) -> bool,
-) -> (f64, [f64; 3], Vec<(f32, f64)>) {
+/// The surface of some materials.
+struct Measured {
+    area: f64,
+    color: [f64; 3],
+    transmittance: Option<[f64; 3]>,
+    /// (height, area) of each part.
+    heights: Vec<(f32, f64)>,
+}
+
+/// Measures the surface of some materials.
+fn measure(mesh: &Mesh, surface: &Surface, keep: impl Fn(&Material) -> bool) -> Measured {
     let mut seen = HashSet::new();
-    let (mut area, mut color) = (0.0, [0.0; 3]);
+    let stated = mesh.materials.iter().any(|m| keep(m) && m.transmission.is_some());
+    let (mut area, mut color, mut through) = (0.0, [0.0; 3], [0.0; 3]);
     // (height, area) of each part of a triangle row.
     let mut heights: Vec<(f32, f64)> = Vec::new();
     let mut linear = [0f64; 256];
@@ -90,13 +102,28 @@ fn measure(
             }
             area += part;
             heights.push((corners[0].z * (1.0 - s - t) + corners[1].z * s + corners[2].z * t, part));
-            let texel = material.texture.as_ref().map_or([255; 3], |texture| nearest(texture, uv));
+            let texel = texel_of(&material.texture, uv);
+            let sent = material.transmission.as_ref().map(|t| {
+                let opacity = f64::from(texel_of(&t.factor_texture, uv)[3]) / 255.0;
+                (f64::from(t.factor) * opacity, t.color, texel_of(&t.color_texture, uv))
+            });
             for i in 0..3 {
-                color[i] += part * linear[texel[i] as usize] * f64::from(material.base_color[i]);
+                let all = part * linear[texel[i] as usize] * f64::from(material.base_color[i]);
+                match sent {
+                    Some((share, c, texel)) => {
+                        color[i] += (1.0 - share) * all;
+                        through[i] += part * share * linear[texel[i] as usize] * f64::from(c[i]);
+                    }
+                    None => {
+                        color[i] += all;
+                        through[i] += 0.5 * all;
+                    }
+                }
             }
         }
     }
-    (area, color.map(|c| if area > 0.0 { c / area } else { 0.0 }), heights)
+    let mean = |sum: [f64; 3]| sum.map(|c| if area > 0.0 { c / area } else { 0.0 });
+    Measured { area, color: mean(color), transmittance: stated.then(|| mean(through)), heights }
 }
 
 /// Barycentric coordinates of the middles of a triangle's parts.
@@ -111,10 +138,12 @@ fn parts() -> impl Iterator<Item = (f32, f32)> {
     })
 }
 
-fn nearest(texture: &Texture, uv: Vec2) -> [u8; 3] {
+/// RGBA of a texture, white where there is none; wraps around.
+fn texel_of(texture: &Option<Arc<Texture>>, uv: Vec2) -> [u8; 4] {
+    let Some(texture) = texture else { return [255; 4] };
     let wrap = |x: f32, n: u32| ((x - x.floor()) * n as f32) as u32 % n;
     let at = 4 * (wrap(uv.y, texture.height) * texture.width + wrap(uv.x, texture.width)) as usize;
-    [texture.rgba[at], texture.rgba[at + 1], texture.rgba[at + 2]]
+    std::array::from_fn(|k| texture.rgba[at + k])
 }
 
 /// Horizontal projected area in units of the frame's `half_width`²: the opacity of the view from the zenith.
@@ -150,7 +179,8 @@ fn colours_of(leaves: &Leaves, stated: &OpticsOverride) -> Colours {
     } else {
         (stated.bark_reflectance.unwrap_or(color), 0.0)
     };
-    let transmittance = match stated.leaf_transmittance {
+    let measured = leaves.transmittance.map(|t| t.map(|c| c as f32));
+    let transmittance = match stated.leaf_transmittance.or(measured) {
         Some(t) if leaves.foliage => t,
         _ => reflectance.map(|r| share * r),
     };
@@ -195,5 +225,57 @@ pub fn species(mesh: &Mesh, surface: &Surface, views: ZField, stated: &OpticsOve
         bark_reflectance: colours.bark_reflectance,
         transmittance: colours.transmittance,
         area: area as f32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Transmission;
+    use crate::scene::mesh::Triangle;
+
+    /// A square leaf of a colour, whose texture coordinates all are the middle of a texture.
+    fn leaf(material: Material) -> Mesh {
+        Mesh {
+            positions: vec![[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 2.0], [0.0, 1.0, 2.0]],
+            normals: vec![[0.0, 0.0, 1.0]; 4],
+            uvs: vec![[0.5; 2]; 4],
+            triangles: [[0, 1, 2], [0, 2, 3]].map(|vertices| Triangle { vertices, material: 0 }).to_vec(),
+            materials: vec![material],
+            dropped_triangles: 0,
+        }
+    }
+
+    fn measured(material: Material, stated: &OpticsOverride) -> [[f32; 3]; 2] {
+        let mesh = leaf(material);
+        let colours = colours(&mesh, &Surface::new(&mesh).unwrap(), stated);
+        [colours.reflectance, colours.transmittance]
+    }
+
+    fn near(a: [f32; 3], b: [f32; 3]) -> bool {
+        a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6)
+    }
+
+    /// KHR_materials_diffuse_transmission: a share goes through with a colour of its own, the rest is reflected; the scene wins over the model.
+    #[test]
+    fn what_goes_through_a_leaf_is_what_its_material_says() {
+        let texture = |rgba: [u8; 4]| Some(Arc::new(Texture { width: 1, height: 1, rgba: rgba.to_vec() }));
+        let plain = Material { base_color: [0.2, 0.4, 0.1, 1.0], ..Material::leaf() };
+        let none = OpticsOverride::default();
+        let [r, t] = measured(plain.clone(), &none);
+        assert!(near(r, [0.2, 0.4, 0.1]) && near(t, [0.1, 0.2, 0.05]), "{r:?} {t:?}");
+
+        let transmission = Transmission {
+            factor: 0.5,
+            factor_texture: texture([0, 0, 0, 51]), // a fifth
+            color: [1.0, 0.5, 0.25],
+            color_texture: texture([255, 255, 0, 255]),
+        };
+        let sends = Material { transmission: Some(transmission), ..plain };
+        let [r, t] = measured(sends.clone(), &none);
+        assert!(near(r, [0.18, 0.36, 0.09]) && near(t, [0.1, 0.05, 0.0]), "{r:?} {t:?}");
+
+        let stated = OpticsOverride { leaf_transmittance: Some([0.3; 3]), ..none };
+        assert_eq!(measured(sends, &stated)[1], [0.3; 3]);
     }
 }

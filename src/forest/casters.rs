@@ -318,14 +318,21 @@ fn caster_quad(seeds: &SeedData, cascade: &Cascade, b: &DrawnBlock, quad: [i32; 
     CasterQuad { corner: b.block.within(corner), ..bytemuck::Zeroable::zeroed() }
 }
 
-/// Pages of a block, first and last of both axes, that a tree may cast into, none where a last is before a first; twin of
+/// Pages of a block, first and last of both axes, that a tree with views of so many texels may cast into, none where a last is before a first; twin of
 /// `caster_place` and `caster_pages` in `shaders/forest/casters.glsl`, to the bit.
-pub fn reached(b: &ShadowBlock, quad: &CasterQuad, seed: &Seed, species: &Species) -> [[i32; 2]; 2] {
+pub fn reached(
+    b: &ShadowBlock,
+    quad: &CasterQuad,
+    seed: &Seed,
+    species: &Species,
+    resolution: u32,
+) -> [[i32; 2]; 2] {
     let height = (seed.ground - b.ground) + species.centre * seed.scale;
     let within = [seed.position[0], seed.position[1], height];
     let along = |a: [f32; 3]| (a[0] * within[0] + a[1] * within[1]) + a[2] * within[2];
     let place = [quad.corner[0] + along(b.x), quad.corner[1] + along(b.y)];
-    let reach = (species.bounding_radius * seed.scale) * b.texels_per_metre + 2.0;
+    let around = (species.bounding_radius * seed.scale) * b.texels_per_metre;
+    let reach = around + (1.5 * around / resolution as f32).max(2.0);
     let page = |v: f32, k: usize| {
         (v * b.pages_per_texel).floor().clamp(b.first[k] as f32 - 1.0, b.last[k] as f32) as i32
     };

@@ -71,6 +71,12 @@ impl Key {
                     if let Some(t) = &m.texture {
                         b.put(&[t.width, t.height]).put(&t.rgba);
                     }
+                    if let Some(t) = &m.transmission {
+                        b.put(&[t.factor]).put(&t.color);
+                        for texture in [&t.factor_texture, &t.color_texture] {
+                            b.put(texture.as_ref().map_or(&[][..], |t| &t.rgba));
+                        }
+                    }
                 }
                 let o = &s.optics;
                 for c in [o.leaf_reflectance, o.leaf_transmittance, o.bark_reflectance] {

@@ -44,6 +44,21 @@ pub struct Material {
     pub alpha_cutoff: Option<f32>,
     /// Seen from both sides.
     pub double_sided: bool,
+    /// What of light goes through it, if the file says so.
+    pub transmission: Option<Transmission>,
+}
+
+/// What of diffuse light goes through a surface (KHR_materials_diffuse_transmission): a share, times a colour of its own; the rest is reflected with the base colour.
+#[derive(Clone, Debug)]
+pub struct Transmission {
+    /// The share.
+    pub factor: f32,
+    /// Its opacity is a factor of the share; has the base colour's texture coordinates.
+    pub factor_texture: Option<Arc<Texture>>,
+    /// Linear RGB of what goes through.
+    pub color: [f32; 3],
+    /// Its colour is a factor of that; has the base colour's texture coordinates.
+    pub color_texture: Option<Arc<Texture>>,
 }
 
 impl Material {
@@ -56,6 +71,7 @@ impl Material {
             texture: None,
             alpha_cutoff: None,
             double_sided: true,
+            transmission: None,
         }
     }
 }

@@ -22,7 +22,7 @@ use crate::physics::wind::Wind;
 use crate::settings::{Settings, nearest};
 use crate::{Error, Result};
 pub use file::{default_scene, load, load_at, parse};
-pub use mesh::{Material, Mesh, Texture};
+pub use mesh::{Material, Mesh, Texture, Transmission};
 
 /// A whole scene, ready to plan and render.
 #[derive(Clone, Debug)]

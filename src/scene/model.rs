@@ -7,6 +7,7 @@
 mod accessors;
 mod buffers;
 mod materials;
+mod transmission;
 
 use std::collections::HashMap;
 use std::path::Path;

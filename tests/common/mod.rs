@@ -30,6 +30,7 @@ pub fn real_tree(name: &str) -> Mesh {
             alpha_cutoff: (m.alpha_mode() == gltf::material::AlphaMode::Mask)
                 .then(|| m.alpha_cutoff().unwrap_or(0.5)),
             double_sided: m.double_sided(),
+            transmission: None,
         }
     });
     let mut mesh = Mesh { materials: materials.collect(), ..Mesh::default() };
@@ -58,6 +59,7 @@ pub fn material(foliage: bool) -> Material {
         texture: None,
         alpha_cutoff: None,
         double_sided: foliage,
+        transmission: None,
     }
 }
 

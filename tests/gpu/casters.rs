@@ -42,7 +42,13 @@ fn check(gpu: &Gpu, renderer: &Renderer) -> Vec<usize> {
     let mut want: Vec<Vec<u32>> = vec![Vec::new(); blocks.len()];
     let casts = |quad: &CasterQuad, seed: &Seed| {
         let b = &blocks[quad.block as usize];
-        let [first, last] = reached(&b.gpu, quad, seed, &forest.species.rows[device::species(seed)]);
+        let [first, last] = reached(
+            &b.gpu,
+            quad,
+            seed,
+            &forest.species.rows[device::species(seed)],
+            renderer.scene().settings.view_resolution,
+        );
         (first[1]..=last[1]).any(|y| {
             let row = b.pages.rows[(i64::from(y) + b.block.shift[1]) as usize];
             (first[0]..=last[0]).any(|x| row >> (i64::from(x) + b.block.shift[0]) & 1 != 0)

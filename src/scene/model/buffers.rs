@@ -60,11 +60,13 @@ impl Buffers {
 /// Parses and validates the document and reads its buffers.
 pub(super) fn open(name: &Path, bytes: &[u8], folder: Option<&Path>) -> Result<(gltf::Document, Buffers)> {
     let (text, mut chunk) = split(name, bytes)?;
-    let root: json::Root = json::deserialize::from_slice(text).map_err(|e| {
+    let mut root: json::Root = json::deserialize::from_slice(text).map_err(|e| {
         let place = format!("JSON line {}, column {}", e.line(), e.column());
         Error::input(name, place, e.to_string(), "export the model again")
     })?;
     check_positions(name, &root)?;
+    // Of this the `gltf` crate knows nothing, and we do.
+    root.extensions_required.retain(|e| e != super::transmission::NAME);
     let document = gltf::Document::from_json(root).map_err(|e| invalid(name, e))?;
     let mut data = Vec::new();
     let mut total = 0u64;

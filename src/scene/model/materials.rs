@@ -7,7 +7,8 @@ use std::sync::Arc;
 use gltf::material::AlphaMode;
 
 use super::buffers::Buffers;
-use crate::scene::mesh::{Material, Texture};
+use super::transmission::{Stated, TextureInfo};
+use crate::scene::mesh::{Material, Texture, Transmission};
 use crate::scene::texture::decode_texture;
 use crate::settings::nearest;
 use crate::{Error, Result};
@@ -127,7 +128,30 @@ impl<'a> Materials<'a> {
             texture,
             alpha_cutoff,
             double_sided: material.double_sided(),
+            transmission: match Stated::of(self.name, &place, material)? {
+                Some(stated) => Some(self.transmission(&place, stated)?),
+                None => None,
+            },
         })
+    }
+
+    fn transmission(&mut self, place: &str, stated: Stated) -> Result<Transmission> {
+        Ok(Transmission {
+            factor: stated.diffuse_transmission_factor,
+            factor_texture: self.named(place, stated.diffuse_transmission_texture)?,
+            color: stated.diffuse_transmission_color_factor,
+            color_texture: self.named(place, stated.diffuse_transmission_color_texture)?,
+        })
+    }
+
+    /// A texture that an extension refers to.
+    fn named(&mut self, place: &str, info: Option<TextureInfo>) -> Result<Option<Arc<Texture>>> {
+        let Some(TextureInfo { index, .. }) = info else { return Ok(None) };
+        let texture = self.document.textures().nth(index).ok_or_else(|| {
+            let what = format!("textures[{index}] is not there");
+            Error::input(self.name, place, what, "correct the material and export the model again")
+        })?;
+        self.texture(texture.source().index()).map(Some)
     }
 
     fn texture(&mut self, image: usize) -> Result<Arc<Texture>> {
