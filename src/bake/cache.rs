@@ -29,7 +29,7 @@ use crate::physics::tables::ForestTables;
 use crate::physics::transfer::Transfer;
 use crate::physics::views;
 use crate::physics::zfield::ZField;
-use crate::scene::{Mesh, OpticsOverride};
+use crate::scene::{Mesh, OpticsOverride, Texture};
 
 const VIEWS: Format = Format { magic: *b"CANOPYZF", version: 14, extension: "zfield" };
 const TRANSFER: Format = Format { magic: *b"CANOPYLT", version: 4, extension: "transfer" };
@@ -334,17 +334,17 @@ pub(super) fn put_mesh(fields: &mut Fields, mesh: &Mesh) {
         put(&[u8::from(m.foliage), u8::from(m.double_sided)]);
         put(bytemuck::bytes_of(&m.base_color));
         put(m.alpha_cutoff.as_ref().map_or(&[], bytemuck::bytes_of));
-        let (size, rgba): ([u32; 2], &[u8]) =
-            m.texture.as_ref().map_or(([0; 2], &[]), |t| ([t.width, t.height], &t.rgba));
-        put(bytemuck::bytes_of(&size));
-        put(rgba);
+        let mut put_texture = |texture| {
+            let (size, rgba) = Texture::content(texture);
+            put(bytemuck::bytes_of(&size));
+            put(rgba);
+        };
+        put_texture(&m.texture);
         if let Some(t) = &m.transmission {
-            put(b"transmission");
+            put_texture(&t.factor_texture);
+            put_texture(&t.color_texture);
             put(bytemuck::bytes_of(&t.factor));
             put(bytemuck::bytes_of(&t.color));
-            for texture in [&t.factor_texture, &t.color_texture] {
-                put(texture.as_ref().map_or(&[], |t| &t.rgba));
-            }
         }
     }
 }

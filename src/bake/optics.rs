@@ -110,9 +110,9 @@ fn measure(mesh: &Mesh, surface: &Surface, keep: impl Fn(&Material) -> bool) -> 
             for i in 0..3 {
                 let all = part * linear[texel[i] as usize] * f64::from(material.base_color[i]);
                 match sent {
-                    Some((share, c, texel)) => {
+                    Some((share, c, colour)) => {
                         color[i] += (1.0 - share) * all;
-                        through[i] += part * share * linear[texel[i] as usize] * f64::from(c[i]);
+                        through[i] += part * share * linear[colour[i] as usize] * f64::from(c[i]);
                     }
                     None => {
                         color[i] += all;

@@ -5,7 +5,7 @@ use bytemuck::NoUninit;
 use super::Options;
 use crate::bake::grove::Tree;
 use crate::camera::Eye;
-use crate::scene::{Albedo, Distribution, Scene, Sky};
+use crate::scene::{Albedo, Distribution, Scene, Sky, Texture};
 
 /// Raised when the same scene gives other samples than before.
 const VERSION: u32 = 1;
@@ -74,7 +74,8 @@ impl Key {
                     if let Some(t) = &m.transmission {
                         b.put(&[t.factor]).put(&t.color);
                         for texture in [&t.factor_texture, &t.color_texture] {
-                            b.put(texture.as_ref().map_or(&[][..], |t| &t.rgba));
+                            let (size, rgba) = Texture::content(texture);
+                            b.put(&size).put(rgba);
                         }
                     }
                 }

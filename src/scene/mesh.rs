@@ -86,3 +86,10 @@ pub struct Texture {
     /// `width * height * 4` bytes.
     pub rgba: Vec<u8>,
 }
+
+impl Texture {
+    /// Columns and rows, and bytes, of a texture that a key is to hold; none of either where there is none.
+    pub(crate) fn content(texture: &Option<Arc<Texture>>) -> ([u32; 2], &[u8]) {
+        texture.as_ref().map_or(([0; 2], &[]), |t| ([t.width, t.height], &t.rgba))
+    }
+}

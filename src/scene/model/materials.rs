@@ -128,10 +128,9 @@ impl<'a> Materials<'a> {
             texture,
             alpha_cutoff,
             double_sided: material.double_sided(),
-            transmission: match Stated::of(self.name, &place, material)? {
-                Some(stated) => Some(self.transmission(&place, stated)?),
-                None => None,
-            },
+            transmission: Stated::of(self.name, &place, material)?
+                .map(|stated| self.transmission(&place, stated))
+                .transpose()?,
         })
     }
 
