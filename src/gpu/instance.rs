@@ -50,58 +50,99 @@ pub(super) struct Root {
     /// Whether objects can be named.
     pub debug_utils: bool,
     pub instance: ash::Instance,
+    /// It is this one's alone, and goes with it; otherwise it is [`Plain`].
+    own: bool,
     // Last: the loader must outlive everything made through it.
     pub entry: ash::Entry,
 }
 
 impl Root {
-    /// Makes an instance with the layers that `validation` needs.
+    /// The plain instance, or one of its own with the layers that `validation` needs.
     ///
     /// # Errors
     /// [`Error::NoDevice`] without a loader or, when validation is asked for, without its layer.
     pub fn new(validation: Validation) -> Result<Self> {
-        let entry = load_entry()?;
-        let app = vk::ApplicationInfo::default()
-            .application_name(c"canopy")
-            .engine_name(c"canopy")
-            .api_version(vk::API_VERSION_1_3);
+        let Plain { entry, instance, debug_utils } = Plain::get()?;
+        if validation == Validation::Off {
+            return Ok(Root {
+                messages: Arc::default(),
+                messenger: None,
+                debug_utils,
+                instance,
+                own: false,
+                entry,
+            });
+        }
         // SAFETY: the loader is loaded.
         let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
-        let validate = validation != Validation::Off;
-        if validate && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION)) {
+        if !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION)) {
             return Err(Error::NoDevice(
                 "validation was asked for but VK_LAYER_KHRONOS_validation is not installed \
                  (on Debian: apt-get install vulkan-validationlayers)"
                     .into(),
             ));
         }
-        // SAFETY: the loader is loaded.
-        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
-        let debug_utils =
-            validate || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
         let layer_names = [VALIDATION.as_ptr()];
-        let extension_names = [ext::debug_utils::NAME.as_ptr()];
         let (enables, disables) = validation.features();
         let mut features = vk::ValidationFeaturesEXT::default()
             .enabled_validation_features(enables)
             .disabled_validation_features(disables);
-        let mut create = vk::InstanceCreateInfo::default().application_info(&app);
-        if debug_utils {
-            create = create.enabled_extension_names(&extension_names);
-        }
-        if validate {
-            create = create.enabled_layer_names(&layer_names).push_next(&mut features);
-        }
-        // SAFETY: `create` and what it points to live through the call.
-        let instance = unsafe { entry.create_instance(&create, None) }
-            .map_err(|e| Error::NoDevice(format!("no Vulkan instance: {e}")))?;
-
-        let mut root = Root { messages: Arc::default(), messenger: None, debug_utils, instance, entry };
-        if validate {
-            root.messenger = Some(listen(&root.entry, &root.instance, &root.messages)?);
-        }
+        let create = vk::InstanceCreateInfo::default().enabled_layer_names(&layer_names).push_next(&mut features);
+        let instance = create_instance(&entry, create, true)?;
+        let mut root =
+            Root { messages: Arc::default(), messenger: None, debug_utils: true, instance, own: true, entry };
+        root.messenger = Some(listen(&root.entry, &root.instance, &root.messages)?);
         Ok(root)
     }
+}
+
+/// The instance without layers, one for the whole process. It is never destroyed: the loader unloads a driver with its last
+/// instance, and NVIDIA's (580) cannot be loaded again after some thirty times, so that a program which opens device after
+/// device, as the conformance cases do, would lose it. It is also what watched instances are made beside.
+#[derive(Clone)]
+pub(super) struct Plain {
+    pub entry: ash::Entry,
+    pub instance: ash::Instance,
+    /// Whether objects can be named.
+    debug_utils: bool,
+}
+
+impl Plain {
+    /// Makes it the first time.
+    ///
+    /// # Errors
+    /// [`Error::NoDevice`] without a loader or a driver; it is tried again the next time.
+    pub fn get() -> Result<Self> {
+        static PLAIN: Mutex<Option<Plain>> = Mutex::new(None);
+        let mut plain = lock(&PLAIN);
+        if let Some(made) = &*plain {
+            return Ok(made.clone());
+        }
+        let entry = load_entry()?;
+        // SAFETY: the loader is loaded.
+        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
+        let debug_utils = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
+        let instance = create_instance(&entry, vk::InstanceCreateInfo::default(), debug_utils)?;
+        Ok(plain.insert(Plain { entry, instance, debug_utils }).clone())
+    }
+}
+
+/// An instance as `create` says, with the extension that names objects if `debug_utils`.
+fn create_instance(
+    entry: &ash::Entry,
+    create: vk::InstanceCreateInfo<'_>,
+    debug_utils: bool,
+) -> Result<ash::Instance> {
+    let app = vk::ApplicationInfo::default()
+        .application_name(c"canopy")
+        .engine_name(c"canopy")
+        .api_version(vk::API_VERSION_1_3);
+    let names = [ext::debug_utils::NAME.as_ptr()];
+    let names = if debug_utils { &names[..] } else { &[] };
+    let create = create.application_info(&app).enabled_extension_names(names);
+    // SAFETY: `create` and what it points to live through the call.
+    unsafe { entry.create_instance(&create, None) }
+        .map_err(|e| Error::NoDevice(format!("no Vulkan instance: {e}")))
 }
 
 impl Drop for Root {
@@ -111,12 +152,14 @@ impl Drop for Root {
             if let Some((debug, messenger)) = self.messenger.take() {
                 debug.destroy_debug_utils_messenger(messenger, None);
             }
-            self.instance.destroy_instance(None);
+            if self.own {
+                self.instance.destroy_instance(None);
+            }
         }
     }
 }
 
-pub(super) fn load_entry() -> Result<ash::Entry> {
+fn load_entry() -> Result<ash::Entry> {
     // SAFETY: the Vulkan loader is a well-behaved library; nothing else runs in its initialisers.
     unsafe { ash::Entry::load() }.map_err(|e| {
         Error::NoDevice(format!(

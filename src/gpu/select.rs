@@ -4,7 +4,7 @@ use std::ffi::CStr;
 
 use ash::vk;
 
-use super::instance::load_entry;
+use super::instance::Plain;
 use super::{Shader, shaders};
 use crate::{Error, Result};
 
@@ -56,7 +56,7 @@ pub struct DeviceInfo {
 /// # Errors
 /// [`Error::NoDevice`] if there is no Vulkan loader or the instance cannot be made.
 pub fn devices() -> Result<Vec<DeviceInfo>> {
-    look(all).map(|found| found.into_iter().map(|(_, info)| info).collect())
+    Ok(all(&Plain::get()?.instance)?.into_iter().map(|(_, info)| info).collect())
 }
 
 /// The device that [`super::Gpu::new`] would open, unopened.
@@ -64,21 +64,7 @@ pub fn devices() -> Result<Vec<DeviceInfo>> {
 /// # Errors
 /// [`Error::NoDevice`] with the reason for every device when none fits.
 pub fn find(wanted: Option<&str>) -> Result<DeviceInfo> {
-    look(|instance| choose(instance, wanted)).map(|(_, info)| info)
-}
-
-/// Looks at the devices through an instance that lives no longer.
-fn look<T>(what: impl FnOnce(&ash::Instance) -> Result<T>) -> Result<T> {
-    let entry = load_entry()?;
-    let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-    let create = vk::InstanceCreateInfo::default().application_info(&app);
-    // SAFETY: `create` and what it points to live through the call.
-    let instance = unsafe { entry.create_instance(&create, None) }
-        .map_err(|e| Error::NoDevice(format!("no Vulkan instance: {e}")))?;
-    let found = what(&instance);
-    // SAFETY: nothing made from the instance is alive: devices are only looked at.
-    unsafe { instance.destroy_instance(None) };
-    found
+    choose(&Plain::get()?.instance, wanted).map(|(_, info)| info)
 }
 
 fn all(instance: &ash::Instance) -> Result<Vec<(vk::PhysicalDevice, DeviceInfo)>> {

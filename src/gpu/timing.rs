@@ -149,12 +149,13 @@ pub(super) fn calibration_extension(
     unsafe {
         let all = instance.enumerate_device_extension_properties(physical).ok()?;
         let has = |name| all.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
-        let (name, domains) = if has(khr::calibrated_timestamps::NAME) {
-            let i = khr::calibrated_timestamps::Instance::new(entry, instance);
-            (khr::calibrated_timestamps::NAME, i.get_physical_device_calibrateable_time_domains(physical))
-        } else if has(ext::calibrated_timestamps::NAME) {
+        // The older name first: devices that know the newer one have both, but layers and tools may not have heard of it yet.
+        let (name, domains) = if has(ext::calibrated_timestamps::NAME) {
             let i = ext::calibrated_timestamps::Instance::new(entry, instance);
             (ext::calibrated_timestamps::NAME, i.get_physical_device_calibrateable_time_domains(physical))
+        } else if has(khr::calibrated_timestamps::NAME) {
+            let i = khr::calibrated_timestamps::Instance::new(entry, instance);
+            (khr::calibrated_timestamps::NAME, i.get_physical_device_calibrateable_time_domains(physical))
         } else {
             return None;
         };
