@@ -19,7 +19,7 @@ const uint COVER_LEVELS = 4u;         // mip levels of a coverage tile
 const uint COVER_GROUPS = 3u;         // most layers of a tile: its coverage and a channel a species, four a layer
 const uint ORDER_LANES = 128u;        // invocations that sort trees by depth, each a part of the list without gaps
 const uint DEPTH_BINS = 768u;         // bins of that sort: 32 an octave, from 1/64 m on
-const uint BIN_LANES = 64u;           // invocations that write the tiles' lists, each a part of all entries without gaps
+const uint SCAN_BLOCK = 2048u;        // counts of which a workgroup makes prefix sums
 const uint TILE_SIDE = 8u;            // pixels along a side of a tile
 const uint SIGHT_TEXELS = 8u;         // 16-byte words of a tree's record for finding its visible samples
 const uint MESH_TREES = 4096u;        // most trees in view that are meshes: 12 bits of what a sample sees
@@ -336,10 +336,11 @@ struct CullParameters {
 // What the tile rasteriser takes.
 struct TileParameters {
     uvec2 size;                       // of the image, pixels
-    uint lists_across;                // lists of tiles along a row
+    uvec2 lists;                      // of tiles along a row and down a column
     uint list_shift;                  // log2 of the pixels along a side of the tiles that share a list
     float near;                       // distance of the near plane, m
     uint step_capacity;               // steps of writing the lists: trees, and entries that all lists together hold
+    uint list_lanes;                  // invocations that write them, each a part of all steps without gaps
 };
 
 // What of a frame's trees the tiles' passes find on their way.

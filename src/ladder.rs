@@ -1,7 +1,8 @@
 //! The ladder: what stands for a tree, from near to far, and where one rung hands over to the next.
 //!
 //! A user writes it as `mesh:256,zfield:4,shader-map`: rungs, each with the apparent height of a tree in pixels down to which it is
-//! used, and the last without, because it goes on to the horizon. Where a rung says no height the knob does that is for it.
+//! used, and the last without, because it goes on to the horizon. Where a rung says no height the knob does that is for it. `auto` is
+//! `mesh,zfield,shader-map`, and `zfield,shader-map` where meshes cannot be drawn; who writes the rungs gets them, or an error.
 //!
 //! Hand-overs are one band of the range (BN12, section 7): each tree fades over a tenth of its range at a time of its own, and what
 //! comes behind takes over as all do together. Its numbers stand once, in `shaders/interface.glsl`, with their law in
@@ -50,6 +51,8 @@ struct Step {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ladder {
     steps: [Option<Step>; RUNGS],
+    /// Whether trees may be z-fields where they should be meshes and cannot.
+    yields: bool,
 }
 
 impl Default for Ladder {
@@ -59,12 +62,16 @@ impl Default for Ladder {
 }
 
 impl Ladder {
-    /// z-fields near, the shader-map far: what scenes have that say nothing.
-    pub const AUTO: Ladder = Ladder { steps: [step(Rung::ZField), step(Rung::ShaderMap), None] };
+    /// What scenes have that say nothing: all rungs, and no meshes where the rasteriser, the device or the memory does not take them.
+    pub const AUTO: Ladder =
+        Ladder { steps: [step(Rung::Mesh), step(Rung::ZField), step(Rung::ShaderMap)], yields: true };
+    /// z-fields near, the shader-map far (BN12).
+    pub const BN12: Ladder =
+        Ladder { steps: [step(Rung::ZField), step(Rung::ShaderMap), None], yields: false };
     /// z-fields at any distance.
-    pub const ZFIELD: Ladder = Ladder { steps: [step(Rung::ZField), None, None] };
+    pub const ZFIELD: Ladder = Ladder { steps: [step(Rung::ZField), None, None], yields: false };
     /// The shader-map at any distance.
-    pub const SHADER_MAP: Ladder = Ladder { steps: [step(Rung::ShaderMap), None, None] };
+    pub const SHADER_MAP: Ladder = Ladder { steps: [step(Rung::ShaderMap), None, None], yields: false };
 
     /// Ladders that have a name of their own.
     pub const SHORTHANDS: [(&'static str, Ladder); 3] =
@@ -74,6 +81,12 @@ impl Ladder {
     pub fn name(&self) -> String {
         let named = Self::SHORTHANDS.iter().find(|(_, ladder)| ladder == self);
         named.map_or_else(|| self.to_string(), |(name, _)| name.to_string())
+    }
+
+    /// The same without meshes, for a ladder that may go without; `None` for others.
+    pub fn without_meshes(&self) -> Option<Ladder> {
+        let steps = [self.steps[1], self.steps[2], None];
+        self.yields.then_some(Ladder { steps, yields: false })
     }
 
     fn has(&self, rung: Rung) -> bool {
@@ -212,6 +225,9 @@ impl FromStr for Ladder {
     type Err = LadderError;
 
     fn from_str(text: &str) -> Result<Self, LadderError> {
+        if text.trim() == "auto" {
+            return Ok(Ladder::AUTO);
+        }
         let parts: Vec<&str> = text.split(',').map(str::trim).collect();
         let mut steps = [None; RUNGS];
         let mut last: Option<Rung> = None;
@@ -247,7 +263,7 @@ impl FromStr for Ladder {
             steps[k] = Some(Step { rung, pixels });
             last = Some(rung);
         }
-        let ladder = Ladder { steps };
+        let ladder = Ladder { steps, yields: false };
         if last == Some(Rung::Mesh) {
             return Err(LadderError {
                 what: format!("\"{text}\": mesh at any distance"),
@@ -312,8 +328,12 @@ mod tests {
         );
         for (name, ladder) in Ladder::SHORTHANDS {
             assert_eq!(ladder.name(), name);
-            assert_eq!(ladder.to_string().parse::<Ladder>().unwrap(), ladder);
+            assert_eq!(name.parse::<Ladder>().unwrap(), ladder);
         }
+        // Rungs that are written out are demanded.
+        let demanded = Ladder::AUTO.to_string().parse::<Ladder>().unwrap();
+        assert_eq!((demanded.to_string(), demanded.without_meshes()), (Ladder::AUTO.to_string(), None));
+        assert_eq!(Ladder::AUTO.without_meshes(), Some(Ladder::BN12));
         let four = "zfield:4,shader-map".parse::<Ladder>().unwrap();
         assert_eq!(four.name(), "zfield:4,shader-map");
         assert_eq!(serde_json::to_value(four).unwrap(), "zfield:4,shader-map");
@@ -360,14 +380,14 @@ mod tests {
         settings.set("zfield_min_pixels", 5.0).unwrap();
         let four: Ladder = "zfield:4,shader-map".parse().unwrap();
         assert_eq!(four.range(&settings, 1000.0, 3000.0), 250.0);
-        assert_eq!(Ladder::AUTO.range(&settings, 1000.0, 3000.0), 200.0);
-        assert_eq!(Ladder::AUTO.resolved(&settings).to_string(), "zfield:5,shader-map");
+        assert_eq!(Ladder::BN12.range(&settings, 1000.0, 3000.0), 200.0);
+        assert_eq!(Ladder::AUTO.resolved(&settings).to_string(), "mesh:256,zfield:5,shader-map");
         assert_eq!(four.resolved(&settings), four);
         assert_eq!(Ladder::SHADER_MAP.range(&settings, 1000.0, 3000.0), 0.0);
         let near: Ladder = "mesh:200,zfield,shader-map".parse().unwrap();
         assert_eq!((near.mesh_range(&settings, 1000.0), near.range(&settings, 1000.0, 3000.0)), (5.0, 200.0));
         assert_eq!(near.resolved(&settings).to_string(), "mesh:200,zfield:5,shader-map");
-        assert_eq!(Ladder::AUTO.mesh_range(&settings, 1000.0), 0.0);
+        assert_eq!(Ladder::BN12.mesh_range(&settings, 1000.0), 0.0);
         // The farthest tree of z-fields alone is opaque, and nothing is handed over there.
         let relative = 3000.0 / Ladder::ZFIELD.range(&settings, 1000.0, 3000.0);
         assert!((handover::tree_fade(relative, 0.0) - 1.0).abs() < 1e-6 && relative > 0.79);

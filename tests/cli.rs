@@ -219,8 +219,12 @@ fn a_ladder_is_the_scenes_or_the_one_that_is_given() {
     // Half as high, twice as far; and where it does not say, the knob does.
     is(&["--ladder", "zfield:4,shader-map"], "zfield:4,shader-map", 2.0 * range);
     let knob = ["--set", "zfield_min_pixels=2"];
-    for asked in [["--ladder", "zfield,shader-map"], ["--representation", "auto"]] {
-        is(&[&asked[..], &knob].concat(), "zfield:2,shader-map", 4.0 * range);
+    for (asked, rungs) in [
+        (["--ladder", "zfield,shader-map"], "zfield:2,shader-map"),
+        (["--ladder", "auto"], "mesh:256,zfield:2,shader-map"),
+        (["--representation", "auto"], "mesh:256,zfield:2,shader-map"),
+    ] {
+        is(&[&asked[..], &knob].concat(), rungs, 4.0 * range);
     }
     // The scene's own height is no knob.
     is(&knob, "zfield:8,shader-map", range);

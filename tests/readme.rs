@@ -19,26 +19,31 @@ fn the_table_of_knobs_is_that_of_the_settings() {
     assert!(readme.contains(&table), "README.md must hold this table:\n\n{table}");
 }
 
-/// Files of `benches/results` that are sweeps, or benches.
-fn results(sweeps: bool) -> Vec<std::path::PathBuf> {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/results");
+/// Files of `benches/results`, or a folder in it, that are sweeps, or benches.
+fn results(within: &str, sweeps: bool) -> Vec<std::path::PathBuf> {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/results").join(within);
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
     let is_sweep = |f: &std::path::PathBuf| f.file_name().unwrap().to_str().unwrap().starts_with("sweep-");
-    files.retain(|f| is_sweep(f) == sweeps);
+    files.retain(|f| f.is_file() && is_sweep(f) == sweeps);
     files.sort();
     files
 }
 
 #[test]
 fn the_table_of_costs_is_that_of_the_results() {
-    let results: Vec<BenchResult> = results(false).iter().map(|f| BenchResult::load(f).unwrap()).collect();
-    let table = markdown(&results);
-    assert!(include_str!("../README.md").contains(&table), "README.md must hold this table:\n\n{table}");
+    let table = |within| {
+        let files = results(within, false);
+        markdown(&files.iter().map(|f| BenchResult::load(f).unwrap()).collect::<Vec<_>>())
+    };
+    let own = table("");
+    assert!(include_str!("../README.md").contains(&own), "README.md must hold this table:\n\n{own}");
+    let gpu = table("nvidia-h200-580.159.04");
+    assert!(include_str!("../docs/gpu.md").contains(&gpu), "docs/gpu.md must hold this table:\n\n{gpu}");
 }
 
 #[test]
 fn the_tables_of_sweeps_are_those_of_the_results() {
-    for file in results(true) {
+    for file in results("", true) {
         let tables = sweep::markdown::markdown(&SweepResult::load(&file).unwrap());
         for table in tables.split("\n\n") {
             let found = include_str!("../README.md").contains(table.trim_end());

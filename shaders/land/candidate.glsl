@@ -55,7 +55,10 @@ bool candidate(SeedQuad q, uint index, uint pattern_count, out Seed s) {
         }
     }
     vec2 range = species.items[kind].scale_range;
-    s.scale = tree.scale > 0.0 ? tree.scale : mix(range.x, range.y, unit(hash(id ^ HASH_SCALE)));
+    // The same bits on every device: no product and sum may become one operation.
+    float u = unit(hash(id ^ HASH_SCALE));
+    precise float own = range.x * (1.0 - u) + range.y * u;
+    s.scale = tree.scale > 0.0 ? tree.scale : own;
     uint turn = tree.turn >= 0.0 ? uint(tree.turn * 65536.0) & 0xffffu : hash(id ^ HASH_TURN) & 0xffffu;
     s.turn_tint = turn | (hash(id ^ HASH_TINT) & 0xffff0000u);
     s.ground = g.x;

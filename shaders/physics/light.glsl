@@ -3,7 +3,11 @@
 const float PI = 3.141592653589793;
 
 // Angle between two unit vectors. atan2 keeps its precision at 0 and pi, where acos loses it.
-float angle_between(vec3 a, vec3 b) { return atan(length(cross(a, b)), dot(a, b)); }
+// Of the same direction it is 0 exactly: where a product and a difference become one operation a rounding stays of what should be nothing.
+float angle_between(vec3 a, vec3 b) {
+    precise vec3 across = a.yzx * b.zxy - a.zxy * b.yzx;
+    return atan(length(across), dot(a, b));
+}
 
 // 1 where the sun is above the slope's horizon, smoothly 0 within two degrees of it. Twin: src/physics/tables.rs.
 float sun_facing(vec3 l, vec3 n) { return smoothstep(0.0, 0.0349, dot(l, n)); }

@@ -106,8 +106,8 @@ impl DeviceOptions {
 #[derive(clap::Args, Clone, Copy)]
 pub struct RasterizerOptions {
     /// What finds the samples of trees: the graphics pipeline, which lights every fragment, or compute tiles, which find what is
-    /// seen and light it once. auto: tiles on CPU devices that can read as many texels of a buffer as the plan's trees (eight
-    /// each) and the image's samples take, else graphics
+    /// seen and light it once. auto: tiles on devices that can read as many texels of a buffer as the plan's trees (eight each) and
+    /// the image's samples take, else graphics, which draws no meshes
     #[arg(long = "rasterizer", value_name = "NAME", default_value = "auto", value_parser = rasterizers())]
     choice: RasterizerChoice,
 }
@@ -128,10 +128,10 @@ impl RasterizerOptions {
 #[derive(clap::Args, Clone, Copy)]
 pub struct LadderOptions {
     /// What stands for a tree, near to far: rungs, each with the apparent height of a tree in pixels down to which it is used, such
-    /// as zfield:4,shader-map; a height that is left out is zfield_min_pixels. Instead of the scene's [quality] ladder
+    /// as mesh:256,zfield:4,shader-map; a height that is left out is the knob's. Instead of the scene's [quality] ladder
     #[arg(long, value_name = "RUNG:PIXELS,…,RUNG", value_parser = str::parse::<Ladder>, conflicts_with = "representation")]
     ladder: Option<Ladder>,
-    /// Shorthand for a ladder: auto (zfield,shader-map), zfield or shader-map at any distance
+    /// Shorthand for a ladder: auto (mesh,zfield,shader-map; without mesh where that cannot be drawn), zfield or shader-map at any distance
     #[arg(long, value_name = "NAME", value_parser = named(Ladder::SHORTHANDS))]
     representation: Option<Ladder>,
 }

@@ -86,8 +86,10 @@ pub fn run(args: &Args) -> Result<()> {
         table.row([i.kind.into(), i.name.clone(), i.reason.clone(), bytes]);
     }
     table.row(["".into(), "total".into(), "device memory".into(), output::bytes(plan.bytes())]);
+    let no_meshes =
+        plan.no_meshes.as_ref().map_or(String::new(), |why| format!("no tree is a mesh: {why}\n"));
     output::print(&format!(
-        "{}, camera {}, {} x {}, ladder {}, rasterizer {} ({whose})\n{}",
+        "{}, camera {}, {} x {}, ladder {}, rasterizer {} ({whose})\n{no_meshes}{}",
         scene.name,
         camera.name,
         plan.size[0],

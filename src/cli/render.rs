@@ -65,10 +65,10 @@ pub struct Args {
     #[arg(long, value_name = "FILE.json", requires = "budget")]
     sweep: Option<PathBuf>,
     /// What stands for a tree, near to far: rungs, each with the apparent height of a tree in pixels down to which it is used, such
-    /// as zfield:4,shader-map; a height that is left out is zfield_min_pixels. Instead of the scene's [quality] ladder
+    /// as mesh:256,zfield:4,shader-map; a height that is left out is the knob's. Instead of the scene's [quality] ladder
     #[arg(long, value_name = "RUNG:PIXELS,…,RUNG", value_parser = str::parse::<Ladder>, conflicts_with = "representation")]
     ladder: Option<Ladder>,
-    /// Shorthand for a ladder: auto (zfield,shader-map), zfield or shader-map at any distance; or reference: path tracing on the CPU
+    /// Shorthand for a ladder: auto (mesh,zfield,shader-map; without mesh where that cannot be drawn), zfield or shader-map at any distance; or reference: path tracing on the CPU
     #[arg(long, value_name = "NAME", value_parser = named(Drawn::names()))]
     representation: Option<Drawn>,
     #[command(flatten)]
@@ -447,6 +447,9 @@ fn text(r: &Report) -> String {
     drawn.row(["terrain quads".into(), r.terrain_quads.to_string()]);
     drawn.row(["seed quads".into(), r.seed_quads.to_string()]);
     text += &format!("\n{}", drawn.text());
+    if let Some(why) = &r.plan.no_meshes {
+        text += &format!("\nno tree is a mesh: {why}\n");
+    }
 
     let mut memory = Table::new(1, &["device memory", ""]);
     for i in r.plan.items.iter().filter(|i| i.bytes() > 0) {

@@ -61,8 +61,8 @@ pub struct Shadows {
     programs: Programs,
     /// The wind of what is held.
     motion: Option<Motion>,
-    /// Side of leaves, m: where a cascade tells them apart meshes cast into it.
-    leaf_side: f64,
+    /// Largest texel of cascades that meshes cast into, m.
+    mesh_texel: f64,
 }
 
 /// What draws: without relief no ground, and trees if any are drawn by themselves.
@@ -154,13 +154,13 @@ impl Shadows {
                 meshes: meshes.transpose()?,
             },
             motion: None,
-            leaf_side: plan.leaf_side,
+            mesh_texel: plan.mesh_texel,
         })
     }
 
     /// How many of the cascades meshes cast into: the first ones.
     pub fn mesh_cascades(plan: &Plan, cascades: &[Cascade]) -> usize {
-        cascades.iter().take_while(|c| tells_leaves(c.grid.texel, plan.leaf_side)).count()
+        cascades.iter().take_while(|c| c.grid.texel <= plan.mesh_texel).count()
     }
 
     /// The cascades of an eye.
@@ -340,7 +340,7 @@ impl Shadows {
 
     /// Whether trees cast into a block as meshes.
     fn casts_meshes(&self, b: &DrawnBlock) -> bool {
-        self.programs.meshes.is_some() && tells_leaves(b.texel, self.leaf_side)
+        self.programs.meshes.is_some() && b.texel <= self.mesh_texel
     }
 
     fn draw_meshes(
@@ -389,11 +389,6 @@ impl Shadows {
     fn page(&self) -> u32 {
         self.map.size()[0] / SHADOW_PAGES
     }
-}
-
-/// Whether a map of such texels tells leaves apart: two or more are as wide as one, m.
-fn tells_leaves(texel: f64, leaf_side: f64) -> bool {
-    texel <= 0.5 * leaf_side
 }
 
 /// A block as shaders take it; `ground` is the height that corners refer to, m, and `sums` where its cascade's sums begin.

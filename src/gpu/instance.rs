@@ -87,7 +87,8 @@ impl Root {
         let mut features = vk::ValidationFeaturesEXT::default()
             .enabled_validation_features(enables)
             .disabled_validation_features(disables);
-        let create = vk::InstanceCreateInfo::default().enabled_layer_names(&layer_names).push_next(&mut features);
+        let create =
+            vk::InstanceCreateInfo::default().enabled_layer_names(&layer_names).push_next(&mut features);
         let instance = create_instance(&entry, create, true)?;
         let mut root =
             Root { messages: Arc::default(), messenger: None, debug_utils: true, instance, own: true, entry };
@@ -121,7 +122,8 @@ impl Plain {
         let entry = load_entry()?;
         // SAFETY: the loader is loaded.
         let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
-        let debug_utils = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
+        let debug_utils =
+            extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
         let instance = create_instance(&entry, vk::InstanceCreateInfo::default(), debug_utils)?;
         Ok(plain.insert(Plain { entry, instance, debug_utils }).clone())
     }

@@ -91,9 +91,23 @@ pub fn plan(
     let drawing = Drawing { rasterizer, ..Default::default() };
     let mut largest: Option<Plan> = None;
     let eyes: Vec<Eye> = views.iter().map(|v| Eye::new(v, &scene.terrain, size)).collect();
-    // A narrower view's range is longer: each optics with every place.
+    // A narrower view's range is longer: each optics with every place. Of those with the same optics the highest eye sees farthest, or
+    // that farthest from the middle.
     let places: Vec<[f64; 3]> = eyes.iter().map(|e| e.position).collect();
+    let middle = scene.terrain.extent.map(|side| 0.5 * side);
+    let up = |e: &Eye| e.position[2].abs();
+    let aside = |e: &Eye| (e.position[0] - middle[0]).hypot(e.position[1] - middle[1]);
+    let mut farthest: BTreeMap<u64, [&Eye; 2]> = BTreeMap::new();
     for eye in &eyes {
+        let [high, far] = farthest.entry(eye.pixels_at_1m.to_bits()).or_insert([eye; 2]);
+        if up(eye) > up(high) {
+            *high = eye;
+        }
+        if aside(eye) > aside(far) {
+            *far = eye;
+        }
+    }
+    for eye in farthest.into_values().flatten() {
         let plan = Plan::for_path(scene, eye, &places, false, drawing, Some(gpu.info()))?;
         if largest.as_ref().is_none_or(|l| plan.bytes() > l.bytes()) {
             largest = Some(plan);

@@ -172,8 +172,8 @@ pub fn differences(a: &BenchResult, b: &BenchResult) -> Vec<Difference> {
     let rasterizer =
         |r: &BenchResult| r.rasterizer.clone().unwrap_or_else(|| Rasterizer::Graphics.name().into());
     check("settings", "rasterizer", &rasterizer(a), &rasterizer(b));
-    // Those of before ladders had the one that scenes have now that say nothing.
-    let ladder = |r: &BenchResult| r.ladder.clone().unwrap_or_else(|| Ladder::default().to_string());
+    // Those of before ladders had this one.
+    let ladder = |r: &BenchResult| r.ladder.clone().unwrap_or_else(|| Ladder::BN12.to_string());
     check("settings", "ladder", &ladder(a), &ladder(b));
     check("timing", "timing", &a.timing, &b.timing);
     check("device", "device", &a.device, &b.device);

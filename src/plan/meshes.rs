@@ -1,5 +1,7 @@
 //! What a plan lists for trees that are their models' meshes.
 
+use std::collections::HashMap;
+
 use super::Plan;
 use super::items::Items;
 use super::names::resource;
@@ -9,7 +11,7 @@ use crate::gpu::interface::{
 use crate::gpu::{BufferDesc, Description, ImageDesc, vk};
 use crate::physics::levels::BARK_LEVELS;
 use crate::scene::mesh::Triangle;
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Distribution, Mesh, Scene, Species};
 
 /// Format and bytes of the texels as which corners, faces and envelopes are read.
 const WORDS: (vk::Format, u64) = (vk::Format::R32G32B32A32_UINT, 16);
@@ -47,6 +49,37 @@ pub(super) fn leaf_side(scene: &Scene) -> f64 {
     };
     let sides = scene.species.iter().map(|s| of(&s.mesh) * f64::from(s.scale[0]));
     sides.fold(f64::INFINITY, f64::min)
+}
+
+/// Most trees that may be within the ranges of meshes, m at a scale of 1, of an eye somewhere in a scene. Of a density, as many as
+/// there are in a disc at full density, and five standard deviations more: points that keep a distance spread less than Poisson's. Of a
+/// list, the most in any three by three squares as wide as the range, which hold every disc.
+pub(super) fn most_in_range(scene: &Scene, ranges: &[f64]) -> f64 {
+    let of = |(species, range): (&Species, &f64)| -> f64 {
+        let range = range * species.largest_scale();
+        if range <= 0.0 {
+            return 0.0;
+        }
+        match &species.distribution {
+            Distribution::Density { max_density, .. } => {
+                let mean = f64::from(*max_density) * std::f64::consts::PI * range * range;
+                mean + 5.0 * mean.sqrt()
+            }
+            Distribution::Positions(list) => {
+                let mut squares: HashMap<[i64; 2], u32> = HashMap::new();
+                for tree in list.iter() {
+                    *squares.entry([tree.x, tree.y].map(|v| (v / range).floor() as i64)).or_default() += 1;
+                }
+                let mut nines: HashMap<[i64; 2], u32> = HashMap::new();
+                for ([x, y], count) in &squares {
+                    let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [x + dx, y + dy]));
+                    around.for_each(|at| *nines.entry(at).or_default() += count);
+                }
+                f64::from(nines.into_values().max().unwrap_or(0))
+            }
+        }
+    };
+    scene.species.iter().zip(ranges).map(of).sum()
 }
 
 /// 16-byte words of a triangle's envelope for viewers above or below, eight half floats each.

@@ -67,6 +67,9 @@ pub struct Plan {
     pub items: Vec<Item>,
     /// What stands for a tree, near to far, with the apparent heights between the rungs.
     pub ladder: Ladder,
+    /// Why trees near an eye are no meshes, where the ladder would have them so and may go without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_meshes: Option<String>,
     /// What the picture shows; [`Plan::new`] says radiance, and whoever wants another mode sets it before the renderer is made, and has the
     /// plan listed anew ([`Plan::list`]).
     pub view_mode: ViewMode,
@@ -75,6 +78,9 @@ pub struct Plan {
     /// Steps of writing the tiles' lists, at most: [`TILE_STEPS`]; tests set fewer before the renderer is made.
     #[serde(skip)]
     pub tile_steps: u32,
+    /// Invocations that write them; the lists are the same for any number.
+    #[serde(skip)]
+    pub list_lanes: u32,
     /// Whether a pixel of a tile passes over trees on whose views' outlines it is not, and is done when all that it sees is nearer
     /// than its next tree can be: that saves time and changes no bit, which conformance proves by a renderer without.
     #[serde(skip)]
@@ -100,8 +106,8 @@ pub struct Plan {
     pub last_mesh_range: f64,
     /// Whether any tree can come within that of an eye.
     pub meshes: bool,
-    /// Mean side of a leaf of these, of the species with the smallest, m; 0 where none is a mesh.
-    pub leaf_side: f64,
+    /// Largest texel of shadow maps that tell leaves of these apart, m, into which they cast as meshes; 0 where none is a mesh.
+    pub mesh_texel: f64,
     /// Whether light meets the average light that the pair tables hold (BN12, G and T): that of a sun, and where it
     /// converges at any distance that there is.
     pub pair_tables: bool,
@@ -209,10 +215,31 @@ impl Plan {
         device: Option<&DeviceInfo>,
     ) -> Result<Self> {
         let drawing = drawing.into();
-        let ladder = drawing.ladder.unwrap_or(scene.ladder).resolved(&scene.settings);
+        let asked = drawing.ladder.unwrap_or(scene.ladder);
+        let with =
+            |ladder| Self::with_ladder(scene, eye, places, layers, (ladder, drawing.rasterizer), device);
+        match (with(asked), asked.without_meshes()) {
+            (Err(why), Some(fewer)) => {
+                // What is wrong without meshes too is not their fault.
+                with(fewer).map(|plan| Plan { no_meshes: Some(why.to_string()), ..plan })
+            }
+            (plan, _) => plan,
+        }
+    }
+
+    fn with_ladder(
+        scene: &Scene,
+        eye: &Eye,
+        places: &[[f64; 3]],
+        layers: bool,
+        (ladder, rasterizer): (Ladder, Option<Rasterizer>),
+        device: Option<&DeviceInfo>,
+    ) -> Result<Self> {
+        let ladder = ladder.resolved(&scene.settings);
         let mut plan = Plan::empty(scene, eye, layers, ladder, device);
         plan.check_species(scene)?;
-        plan.ranges(scene, eye, places);
+        let ground = range::ground_range(scene);
+        plan.ranges(scene, eye, places, ground);
         plan.shadows(scene, eye);
         if plan.forest {
             plan.seeds(scene, eye, device);
@@ -221,12 +248,11 @@ impl Plan {
             if scene.settings.indirect > 0 {
                 plan.indirect = scene.settings.table_densities;
             }
-            plan.z_fields =
-                std::iter::once(&eye.position).chain(places).any(|p| plan.scene_in_range(scene, *p));
-            plan.meshes = plan.z_fields
-                && std::iter::once(&eye.position).chain(places).any(|p| plan.scene_has_mesh_at(scene, *p));
+            let mut all = std::iter::once(&eye.position).chain(places);
+            plan.z_fields = all.clone().any(|p| plan.scene_in_range(scene, ground, *p));
+            plan.meshes = plan.z_fields && all.any(|p| plan.scene_has_mesh_at(scene, ground, *p));
             if plan.meshes {
-                plan.leaf_side = meshes::leaf_side(scene);
+                plan.mesh_texel = meshes::leaf_side(scene) / f64::from(scene.settings.mesh_shadow_texels);
             }
             if plan.z_fields && plan.sun {
                 plan.transfer_bands = scene.settings.transfer_bands;
@@ -236,7 +262,7 @@ impl Plan {
                 (plan.tree_capacity, plan.caster_capacity) = (0, 0);
             }
         }
-        plan.choose_rasterizer(drawing.rasterizer, device)?;
+        plan.choose_rasterizer(rasterizer, device)?;
         plan.list(scene);
         plan.check(scene.settings.memory_mib, device)?;
         Ok(plan)
@@ -249,9 +275,11 @@ impl Plan {
         Plan {
             items: Vec::new(),
             ladder,
+            no_meshes: None,
             view_mode: ViewMode::Radiance,
             rasterizer: Rasterizer::Graphics,
             tile_steps: TILE_STEPS,
+            list_lanes: 0,
             tile_shortcuts: true,
             size: eye.size,
             samples: check::samples(s.samples, device),
@@ -263,7 +291,7 @@ impl Plan {
             mesh_range: Vec::new(),
             last_mesh_range: 0.0,
             meshes: false,
-            leaf_side: 0.0,
+            mesh_texel: 0.0,
             pair_tables: false,
             indirect: 0,
             transfer_bands: 0,

@@ -1,12 +1,13 @@
 //! How far trees are drawn one by one, and whether any tree can come so near.
 
-use super::Plan;
+use super::{Plan, meshes};
 use crate::camera::Eye;
+use crate::gpu::interface::MESH_TREES;
 use crate::scene::Scene;
 
 impl Plan {
     /// The range of every species and of all, the size of trees, and where they are drawn in another way.
-    pub(super) fn ranges(&mut self, scene: &Scene, eye: &Eye, places: &[[f64; 3]]) {
+    pub(super) fn ranges(&mut self, scene: &Scene, eye: &Eye, places: &[[f64; 3]], ground: [f64; 2]) {
         let s = &scene.settings;
         self.forest = tree_density(scene) > 0.0;
         self.wind = self.forest && scene.wind.is_some();
@@ -17,7 +18,7 @@ impl Plan {
             let sway = scene.wind.map_or(0.0, |w| w.reach(f64::from(reach), f64::from(reach)));
             self.tallest = self.tallest.max((f64::from(reach) + sway) * scale);
         }
-        let farthest = self.farthest(scene, std::iter::once(&eye.position).chain(places));
+        let farthest = self.farthest(scene, std::iter::once(&eye.position).chain(places), ground);
         for species in &scene.species {
             let height = species.mesh.positions.iter().map(|p| p[2]).fold(0.0, f32::max).max(1e-3);
             let range = self.ladder.range(s, f64::from(height) * eye.pixels_at_1m, farthest);
@@ -27,6 +28,7 @@ impl Plan {
             self.last_mesh_range = self.last_mesh_range.max(mesh * species.largest_scale());
             self.range = self.range.max(range);
         }
+        self.last_mesh_range *= self.fit_meshes(scene);
         if self.ladder.averages() {
             self.convergence = f64::from(s.convergence);
         }
@@ -48,6 +50,26 @@ impl Plan {
         }
     }
 
+    /// Shortens the ranges of meshes until the lists hold them all wherever an eye is, where the ladder leaves that to the plan. The factor.
+    fn fit_meshes(&mut self, scene: &Scene) -> f64 {
+        let mut factor = 1.0;
+        if self.ladder.without_meshes().is_none() {
+            return factor;
+        }
+        loop {
+            let most = meshes::most_in_range(scene, &self.mesh_range);
+            if most <= f64::from(MESH_TREES) {
+                break;
+            }
+            // Of evenly spread trees the number goes with the square. So many in one place that they never fit are no forest, and stay
+            // z-fields.
+            let step = if factor > 1e-6 { (f64::from(MESH_TREES) / most).sqrt().min(0.9) } else { 0.0 };
+            self.mesh_range.iter_mut().for_each(|range| *range *= step);
+            factor *= step;
+        }
+        factor
+    }
+
     /// How far shadows are drawn, if any are needed.
     pub(super) fn shadows(&mut self, scene: &Scene, eye: &Eye) {
         let s = &scene.settings;
@@ -67,8 +89,13 @@ impl Plan {
     }
 
     /// The farthest that a tree of the terrain may be from any of these places, m, or from any on the terrain.
-    fn farthest<'a>(&self, scene: &Scene, places: impl Iterator<Item = &'a [f64; 3]>) -> f64 {
-        let trees = self.trees_box(scene.terrain.extent, ground_range(scene));
+    fn farthest<'a>(
+        &self,
+        scene: &Scene,
+        places: impl Iterator<Item = &'a [f64; 3]>,
+        ground: [f64; 2],
+    ) -> f64 {
+        let trees = self.trees_box(scene.terrain.extent, ground);
         places.copied().chain(trees).map(|place| farthest_in(trees, place)).fold(0.0, f64::max)
     }
 
@@ -113,24 +140,28 @@ impl Plan {
         if self.ladder.averages() { self.ladder.opaque_to(nearest) } else { f64::INFINITY }
     }
 
-    /// Whether any tree of a scene may be near enough to a place to be drawn by itself. The nearest ground, below most cameras, saves
-    /// looking at all of it.
-    pub(super) fn scene_in_range(&self, scene: &Scene, place: [f64; 3]) -> bool {
-        near_ground(scene, place, |extent, ground| self.trees_in_range(extent, ground, place))
+    /// Whether any tree of a scene may be near enough to a place to be drawn by itself, on ground between two heights.
+    pub(super) fn scene_in_range(&self, scene: &Scene, ground: [f64; 2], place: [f64; 3]) -> bool {
+        near_ground(scene, ground, place, |extent, ground| self.trees_in_range(extent, ground, place))
     }
 
     /// Whether any tree of a scene may be so near a place that it is its model's mesh.
-    pub(super) fn scene_has_mesh_at(&self, scene: &Scene, place: [f64; 3]) -> bool {
-        near_ground(scene, place, |extent, ground| self.mesh_in_range(extent, ground, place))
+    pub(super) fn scene_has_mesh_at(&self, scene: &Scene, ground: [f64; 2], place: [f64; 3]) -> bool {
+        near_ground(scene, ground, place, |extent, ground| self.mesh_in_range(extent, ground, place))
     }
 }
 
 /// Whether something is so of the ground nearest to a place, or of all ground: its extent and two heights.
-fn near_ground(scene: &Scene, place: [f64; 3], is: impl Fn([f64; 2], [f64; 2]) -> bool) -> bool {
+fn near_ground(
+    scene: &Scene,
+    ground: [f64; 2],
+    place: [f64; 3],
+    is: impl Fn([f64; 2], [f64; 2]) -> bool,
+) -> bool {
     let terrain = &scene.terrain;
     let [x, y] = [0, 1].map(|k| place[k].clamp(0.0, terrain.extent[k]));
     is(terrain.extent, [terrain.height_at(x, y); 2])
-        || terrain.heights.is_some() && is(terrain.extent, ground_range(scene))
+        || terrain.heights.is_some() && is(terrain.extent, ground)
 }
 
 /// The farthest that a point of a box is from a place, m.
@@ -153,7 +184,7 @@ pub(super) fn farthest_trees(scene: &Scene, eye: &Eye) -> f64 {
 }
 
 /// The lowest and the highest ground of a scene, with what bicubic interpolation may add.
-fn ground_range(scene: &Scene) -> [f64; 2] {
+pub(super) fn ground_range(scene: &Scene) -> [f64; 2] {
     let Some(heights) = &scene.terrain.heights else { return [0.0; 2] };
     let fold = |start: f32, f: fn(f32, f32) -> f32| f64::from(heights.samples.iter().copied().fold(start, f));
     let [low, high] = [fold(f32::INFINITY, f32::min), fold(f32::NEG_INFINITY, f32::max)];

@@ -2,13 +2,15 @@
 
 use super::Plan;
 use super::names::{pass, pipeline};
-use crate::gpu::interface::{BIN_LANES, DEPTH_BINS, ORDER_LANES, SIGHT_TEXELS, TileState};
+use crate::gpu::interface::{DEPTH_BINS, ORDER_LANES, SCAN_BLOCK, SIGHT_TEXELS, TileState};
 use crate::gpu::{BufferDesc, DeviceInfo, tree_components, vk};
 use crate::ladder::Ladder;
 use crate::{Error, Result};
 
-/// Steps of writing the lists (trees, and entries): an invocation takes 1/64 of them, and drivers end loops after 65,535 turns.
+/// Steps of writing the lists (trees, and entries): an invocation takes 1/64 of them at most, and drivers end loops after 65,535 turns.
 pub const TILE_STEPS: u32 = 3 << 20;
+/// Invocations that write the lists on a CPU, and on a GPU, of which fewer would leave most idle; each has a count a list.
+const LIST_LANES: [u32; 2] = [64, 512];
 /// Lists of a picture, at most.
 const MOST_LISTS: u32 = 16384;
 
@@ -41,8 +43,8 @@ pub enum Rasterizer {
 }
 
 impl Rasterizer {
-    /// All, with the names that users write; `None` leaves the choice to the plan: tiles where the device is a CPU, on which the
-    /// layers of trees behind each other cost most, and can hold what tiles read; else the graphics pipeline.
+    /// All, with the names that users write; `None` leaves the choice to the plan: tiles where the device can hold what they read, because
+    /// layers of trees behind each other cost most, on CPUs and on the GPU where both were measured; else the graphics pipeline.
     pub const NAMES: [(&'static str, Option<Rasterizer>); 3] =
         [("auto", None), ("graphics", Some(Rasterizer::Graphics)), ("tiles", Some(Rasterizer::Tiles))];
 
@@ -105,6 +107,8 @@ pub struct TileBuffers {
     pub ranked: TileBuffer,
     /// Where each part of a list ends.
     pub list_counts: TileBuffer,
+    /// Sums of blocks of any of these counts.
+    pub blocks: TileBuffer,
     /// Trees of the lists.
     pub entries: TileBuffer,
     /// What the passes find.
@@ -125,8 +129,10 @@ impl TileBuffers {
         };
         let list_shift = (3..32).find(few).unwrap_or(31);
         let lists = lists_of(list_shift);
-        let list_parts = u64::from(lists[0] * lists[1] * BIN_LANES);
+        let list_parts = u64::from(lists[0] * lists[1] * plan.list_lanes);
         let trees = u64::from(plan.tree_capacity);
+        let counts = list_parts.max(trees).max(u64::from(DEPTH_BINS * ORDER_LANES));
+        let blocks = counts.div_ceil(u64::from(SCAN_BLOCK));
         let samples = u64::from(plan.size[0]) * u64::from(plan.size[1]) * u64::from(plan.samples);
         let buffer = |name, bytes, texel, reason| {
             let texels = match texel {
@@ -163,6 +169,7 @@ impl TileBuffers {
                 4,
                 "where the lists of squares of pixels end",
             ),
+            blocks: buffer("block sums", 4 * blocks.max(1), 0, "prefix sums of counts by many workgroups"),
             entries: buffer(
                 "list entries",
                 4 * u64::from(plan.tile_steps.max(1)),
@@ -176,7 +183,7 @@ impl TileBuffers {
     }
 
     /// Every buffer, in the order of allocation.
-    pub fn all(&self) -> [&TileBuffer; 12] {
+    pub fn all(&self) -> [&TileBuffer; 13] {
         [
             &self.keys,
             &self.depth_counts,
@@ -186,6 +193,7 @@ impl TileBuffers {
             &self.spans,
             &self.ranked,
             &self.list_counts,
+            &self.blocks,
             &self.entries,
             &self.state,
             &self.seen,
@@ -215,8 +223,8 @@ impl Plan {
         wanted: Option<Rasterizer>,
         device: Option<&DeviceInfo>,
     ) -> Result<()> {
+        self.list_lanes = LIST_LANES[usize::from(device.is_some_and(|d| d.kind != "cpu"))];
         let beyond = device.and_then(|d| TileBuffers::new(self).beyond(d));
-        let cpu = device.is_none_or(|d| d.kind == "cpu");
         let narrow = device.filter(|d| self.z_fields && d.max_vertex_components < tree_components());
         if let Some(d) = narrow.filter(|_| wanted == Some(Rasterizer::Graphics) || beyond.is_some()) {
             return Err(Error::Usage(format!(
@@ -247,8 +255,8 @@ impl Plan {
                 )));
             }
             (Some(rasterizer), _) => rasterizer,
-            (None, None) if cpu || narrow.is_some() || self.meshes => Rasterizer::Tiles,
-            (None, _) => Rasterizer::Graphics,
+            (None, None) => Rasterizer::Tiles,
+            (None, Some(_)) => Rasterizer::Graphics,
         };
         Ok(())
     }

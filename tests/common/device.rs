@@ -9,6 +9,7 @@ use canopy::camera::Eye;
 use canopy::frame::Renderer;
 use canopy::gpu::interface::Seed;
 use canopy::gpu::{Gpu, GpuOptions, Resource, Shader, Validation};
+use canopy::ladder::Ladder;
 use canopy::measure::conform::probe;
 pub use canopy::measure::conform::probe::{Arguments, Function, Words, float, words};
 use canopy::physics::hash::Stream;
@@ -79,7 +80,10 @@ const SMALL: &str = "\n[quality]\npreset = \"fast\"\nview_rings = 2\nview_resolu
 
 /// A scene from text, with coarse views and small shadow maps so that it is quick to bake and draw.
 pub fn small_scene(text: &str) -> Scene {
-    scene::parse(&format!("{text}{SMALL}"), Path::new("test.toml")).unwrap()
+    let mut scene = scene::parse(&format!("{text}{SMALL}"), Path::new("test.toml")).unwrap();
+    // Meshes have tests of their own.
+    scene.ladder = Ladder::BN12;
+    scene
 }
 
 /// Species of a scene, baked once for all tests and runs.

@@ -269,6 +269,26 @@ fn what_meshes_take_is_planned_and_what_they_cannot_be_is_refused() {
     };
     let graphics = refused(Drawing { ladder: Some(ladder(NEAR)), rasterizer: Some(Rasterizer::Graphics) });
     assert!(graphics.contains("--rasterizer tiles"), "{graphics}");
+    // A ladder that may go without meshes does, and says why: for the rasteriser, and for memory that holds z-fields and no meshes.
+    let planned = |scene: &Scene, drawing: Drawing| {
+        let eye = Eye::new(&near, &scene.terrain, SIZE);
+        Plan::for_eye(scene, &eye, false, drawing, Some(gpu.info()))
+    };
+    let auto = |rasterizer| Drawing { ladder: Some(Ladder::AUTO), rasterizer };
+    let all = planned(&scene, auto(None)).unwrap();
+    assert!(all.meshes && all.no_meshes.is_none() && all.rasterizer == Rasterizer::Tiles);
+    let fewer = planned(&scene, auto(Some(Rasterizer::Graphics))).unwrap();
+    assert!(
+        !fewer.meshes && !fewer.ladder.meshes() && fewer.no_meshes.unwrap().contains("--rasterizer tiles")
+    );
+    let without = planned(&scene, Drawing::from(Ladder::BN12)).unwrap();
+    assert!(without.bytes() < all.bytes());
+    let mut tight = scene.clone();
+    tight.settings.memory_mib = ((without.bytes() >> 20) + 1) as u32;
+    assert!(all.bytes() > u64::from(tight.settings.memory_mib) << 20, "{} {}", all.bytes(), without.bytes());
+    let fewer = planned(&tight, auto(None)).unwrap();
+    assert!(!fewer.meshes && fewer.no_meshes.unwrap().contains("memory_mib"));
+    assert!(planned(&tight, Drawing::from(ladder(NEAR))).is_err());
     // A camera that comes nearer than the plan was made for is told so.
     let mut renderer =
         Renderer::new(&gpu, Arc::new(scene.clone()), of(&far, NEAR), &device::bake_meshes(&scene)).unwrap();
@@ -287,6 +307,14 @@ fn what_meshes_take_is_planned_and_what_they_cannot_be_is_refused() {
         Renderer::new(&gpu, Arc::new(many.clone()), plan, &device::bake_meshes(&many)).unwrap();
     let e = renderer.render(&above, 1.0).unwrap_err().to_string();
     assert!(e.contains("raise mesh_min_pixels"), "{e}");
+    drop(renderer);
+    // Where the ladder leaves it to the plan, meshes end where no more of them can be in view: four trees stand on a square metre.
+    let mut few = many.clone();
+    few.settings.mesh_min_pixels = 16.0;
+    let plan = Plan::for_eye(&few, &eye, false, Ladder::AUTO, Some(gpu.info())).unwrap();
+    assert!(!plan.meshes && (6.0..12.0).contains(&plan.last_mesh_range), "{}", plan.last_mesh_range);
+    let mut renderer = Renderer::new(&gpu, Arc::new(few.clone()), plan, &device::bake_meshes(&few)).unwrap();
+    renderer.render(&above, 1.0).unwrap();
     drop(renderer);
     gpu.close().unwrap();
 }

@@ -139,5 +139,12 @@ fn long_lists_are_gone_through_to_the_end_and_without_lists_all_trees_are() {
         let (_, whole) = draw(&gpu, &scene, short).unwrap();
         assert!(whole == tiles, "with room for {tile_steps} steps other bits are drawn");
     }
+    // Nor does it matter how many write the lists: their counts take less than a block of sums, or several.
+    for list_lanes in [8, 512] {
+        let mut shared = Plan { list_lanes, ..tiled.clone() };
+        shared.list(&scene);
+        let (_, other) = draw(&gpu, &scene, shared).unwrap();
+        assert!(other == tiles, "with lists written by {list_lanes} other bits are drawn");
+    }
     gpu.close().unwrap();
 }

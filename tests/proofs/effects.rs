@@ -28,7 +28,7 @@ impl Bench {
         density: f64,
         views: &[[f64; 2]],
     ) -> Vec<Measured> {
-        let drawing = Ladder::AUTO.into();
+        let drawing = Ladder::BN12.into();
         let request = Request { sun_zenith, slope, distance, drawing, views: views.to_vec() };
         let camera = (&self.scene.cameras[0], SIZE);
         let method = Method { patches: 2, ..Method::default() };
@@ -104,7 +104,7 @@ fn the_six_effects_near_and_far() {
 fn silver_lining(b: &Bench) -> f64 {
     let scene = patch_scene(&b.scene, &[0.0008], 75.0, 0.0).unwrap();
     let eye = Eye::looking([1200.0, 1330.0, 18.0], [0.0, -1.0, -0.06], 40.0, [480, 360]);
-    let plan = Plan::for_eye(&scene, &eye, true, Ladder::AUTO, Some(b.gpu.info())).unwrap();
+    let plan = Plan::for_eye(&scene, &eye, true, Ladder::BN12, Some(b.gpu.info())).unwrap();
     let mut renderer = Renderer::new(&b.gpu, std::sync::Arc::new(scene), plan, &b.baked).unwrap();
     renderer.render_eye(&eye, 1.0).unwrap();
     let l = renderer.picture().unwrap().linear.unwrap();
@@ -148,7 +148,7 @@ fn pictures(b: &Bench) {
             let mut eye = Eye::looking(position, v.map(|c| -c), 40.0, [480, 360]);
             eye.pixels_at_1m /= zoom;
             let exposure = canopy::camera::auto_exposure(&scene);
-            let plan = Plan::for_eye(&scene, &eye, false, Ladder::AUTO, Some(b.gpu.info())).unwrap();
+            let plan = Plan::for_eye(&scene, &eye, false, Ladder::BN12, Some(b.gpu.info())).unwrap();
             let mut renderer = Renderer::new(&b.gpu, std::sync::Arc::new(scene), plan, &b.baked).unwrap();
             renderer.render_eye(&eye, exposure).unwrap();
             let file = folder().join(format!("effect_{name}_{near}.png"));

@@ -30,7 +30,7 @@ fn radiance_does_not_depend_on_distance() {
                     sun_zenith,
                     slope: 0.0,
                     distance,
-                    drawing: Ladder::AUTO.into(),
+                    drawing: Ladder::BN12.into(),
                     views: views.clone(),
                 };
                 let camera = (&scene.cameras[0], SIZE);
@@ -84,7 +84,7 @@ fn the_principal_plane_is_a_bowl_with_a_hotspot() {
             sun_zenith: 60.0,
             slope: 0.0,
             distance,
-            drawing: Ladder::AUTO.into(),
+            drawing: Ladder::BN12.into(),
             views: views.clone(),
         };
         let camera = (&scene.cameras[0], SIZE);

@@ -13,8 +13,10 @@
 use crate::forest::cull::CullData;
 use crate::frame::Forest;
 use crate::frame::targets::ImageTargets;
-use crate::gpu::interface::{BIN_LANES, DEPTH_BINS, ORDER_LANES, TILE_SIDE, TileParameters, TileState};
-use crate::gpu::{Buffer, Gpu, Image, Later, Program, Recorder, Resource, Sampler, Shader, shaders};
+use crate::gpu::interface::{DEPTH_BINS, ORDER_LANES, SCAN_BLOCK, TILE_SIDE, TileParameters, TileState};
+use crate::gpu::{
+    Buffer, ComputePass, Gpu, Image, Later, Program, Recorder, Resource, Sampler, Shader, shaders,
+};
 use crate::physics::outline;
 use crate::plan::names::pass;
 use crate::plan::{Plan, TileBuffer, TileBuffers};
@@ -27,6 +29,8 @@ pub struct TreeTiles {
     tiles: [u32; 2],
     /// Parts of all lists.
     list_parts: u32,
+    /// Most trees.
+    trees: u32,
     keys: Buffer,
     depth_counts: Buffer,
     order: Buffer,
@@ -35,6 +39,7 @@ pub struct TreeTiles {
     spans: Buffer,
     ranked: Buffer,
     list_counts: Buffer,
+    blocks: Buffer,
     entries: Buffer,
     /// What the passes find.
     pub state: Buffer,
@@ -43,7 +48,8 @@ pub struct TreeTiles {
     depths: Buffer,
     order_count: Program,
     order_fill: Program,
-    scan: Program,
+    /// Prefix sums: of blocks, of their sums, and within blocks.
+    scan: [Program; 3],
     sight: Program,
     entries_count: Program,
     entries_fill: Program,
@@ -72,12 +78,14 @@ impl TreeTiles {
         Ok(TreeTiles {
             parameters: TileParameters {
                 size: plan.size,
-                lists_across: lists[0],
+                lists,
                 list_shift: sizes.list_shift,
                 near: crate::camera::NEAR_PLANE as f32,
                 step_capacity: plan.tile_steps,
+                list_lanes: plan.list_lanes,
             },
-            list_parts: lists[0] * lists[1] * BIN_LANES,
+            list_parts: lists[0] * lists[1] * plan.list_lanes,
+            trees: plan.tree_capacity,
             tiles: plan.size.map(|n| n.div_ceil(TILE_SIDE)),
             keys: make(&sizes.keys)?,
             depth_counts: make(&sizes.depth_counts)?,
@@ -87,13 +95,18 @@ impl TreeTiles {
             spans: make(&sizes.spans)?,
             ranked: make(&sizes.ranked)?,
             list_counts: make(&sizes.list_counts)?,
+            blocks: make(&sizes.blocks)?,
             entries: make(&sizes.entries)?,
             state: make(&sizes.state)?,
             seen: make(&sizes.seen)?,
             depths: make(&sizes.depths)?,
             order_count: gpu.compute(&shaders::FRAME_TREES_TILES_ORDER_COUNT_COMP, &[wind])?,
             order_fill: gpu.compute(&shaders::FRAME_TREES_TILES_ORDER_FILL_COMP, &[])?,
-            scan: gpu.compute(&shaders::FRAME_TREES_TILES_SCAN_COMP, &[])?,
+            scan: [
+                gpu.compute(&shaders::FRAME_TREES_TILES_SCAN_BLOCKS_COMP, &[])?,
+                gpu.compute(&shaders::FRAME_TREES_TILES_SCAN_COMP, &[])?,
+                gpu.compute(&shaders::FRAME_TREES_TILES_SCAN_WITHIN_COMP, &[])?,
+            ],
             sight: gpu.compute(
                 &shaders::FRAME_TREES_TILES_SIGHT_COMP,
                 &[
@@ -174,9 +187,7 @@ impl TreeTiles {
             pass.bind(&self.order_count, &depth);
             pass.dispatch([ORDER_LANES / 8, 1, 1]);
             pass.barrier();
-            pass.bind(&self.scan, &with(&all, &[("sums", Resource::Buffer(&self.depth_counts))]));
-            pass.push(&(DEPTH_BINS * ORDER_LANES));
-            pass.dispatch([1, 1, 1]);
+            self.scan(pass, &self.depth_counts, Some(DEPTH_BINS * ORDER_LANES));
             pass.barrier();
             pass.bind(&self.order_fill, &depth);
             pass.dispatch([ORDER_LANES / 8, 1, 1]);
@@ -198,21 +209,17 @@ impl TreeTiles {
         });
         recorder.fill(pass::LIST_COUNTS, &self.list_counts, 0);
         recorder.compute(pass::TILE_LISTS, |pass| {
-            pass.bind(&self.scan, &with(&all, &[("sums", Resource::Buffer(&self.spans))]));
-            pass.push(&0u32);
-            pass.dispatch([1, 1, 1]);
+            self.scan(pass, &self.spans, None);
             pass.barrier();
             pass.bind(&self.entries_count, &own);
             pass.push(p);
-            pass.dispatch([BIN_LANES / 8, 1, 1]);
+            pass.dispatch([p.list_lanes / 8, 1, 1]);
             pass.barrier();
-            pass.bind(&self.scan, &with(&all, &[("sums", Resource::Buffer(&self.list_counts))]));
-            pass.push(&self.list_parts);
-            pass.dispatch([1, 1, 1]);
+            self.scan(pass, &self.list_counts, Some(self.list_parts));
             pass.barrier();
             pass.bind(&self.entries_fill, &own);
             pass.push(p);
-            pass.dispatch([BIN_LANES / 8, 1, 1]);
+            pass.dispatch([p.list_lanes / 8, 1, 1]);
         });
         let [across, down] = self.tiles;
         recorder.compute(pass::TILES, |pass| {
@@ -231,6 +238,24 @@ impl TreeTiles {
             pass.push(p);
             pass.dispatch([down, across, 1]);
         });
+    }
+
+    /// Prefix sums of counts in place, of as many as given or as there are trees, with the total behind the last.
+    fn scan(&self, pass: &mut ComputePass, sums: &Buffer, count: Option<u32>) {
+        let bound = [
+            ("sums", Resource::Buffer(sums)),
+            ("state", Resource::Buffer(&self.state)),
+            ("blocks", Resource::Buffer(&self.blocks)),
+        ];
+        let groups = count.unwrap_or(self.trees).div_ceil(SCAN_BLOCK).max(1);
+        for (step, (program, groups)) in self.scan.iter().zip([groups, 1, groups]).enumerate() {
+            if step > 0 {
+                pass.barrier();
+            }
+            pass.bind(program, &bound);
+            pass.push(&count.unwrap_or(0));
+            pass.dispatch([groups, 1, 1]);
+        }
     }
 
     /// Records the pass that lights them, on top of what else their pixels' samples see.

@@ -47,7 +47,7 @@ pub struct From {
 pub const USUAL: [From; 4] = [
     From { ladder: Ladder::ZFIELD, distance: 200.0 },
     From { ladder: Ladder::ZFIELD, distance: 1000.0 },
-    From { ladder: Ladder::AUTO, distance: 3000.0 },
+    From { ladder: Ladder::BN12, distance: 3000.0 },
     From { ladder: Ladder::SHADER_MAP, distance: 6000.0 },
 ];
 

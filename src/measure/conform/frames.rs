@@ -3,7 +3,7 @@
 use std::process::Command;
 use std::sync::Arc;
 
-use super::scenes::{self, SIZE, SceneCase};
+use super::scenes::{self, RASTERIZERS, SIZE, SceneCase};
 use super::{Finding, Options, finding};
 use crate::bake::{Baked, load_or_bake_scene};
 use crate::camera::{Eye, auto_exposure};
@@ -13,9 +13,6 @@ use crate::image::Picture;
 use crate::plan::{Plan, Rasterizer, ViewMode};
 use crate::scene::{Camera, Scene};
 use crate::{Error, Result};
-
-/// Both ways of finding samples: what must hold of a frame must hold of each.
-pub(super) const RASTERIZERS: [Rasterizer; 2] = [Rasterizer::Graphics, Rasterizer::Tiles];
 
 /// A renderer of a scene of the suite, with its camera and exposure.
 fn renderer(
@@ -75,7 +72,7 @@ pub(super) fn draw(
 /// What must hold of a frame, by each rasteriser.
 pub(super) fn check(gpu: &Gpu, options: &Options, case: &SceneCase) -> Result<Finding> {
     let (mut problems, mut measured) = (Vec::new(), Vec::new());
-    for rasterizer in RASTERIZERS {
+    for rasterizer in case.rasterizers().iter().copied() {
         let picture = draw(gpu, options, case, rasterizer, true)?;
         let (wrong, found) = laws(case, &picture)?;
         problems.extend(wrong.into_iter().map(|p| format!("{}: {p}", rasterizer.name())));

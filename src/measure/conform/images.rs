@@ -6,7 +6,6 @@ use super::scenes::{SIZE, SceneCase};
 use super::{Finding, Suite, driver_key, finding, frames, with_device};
 use crate::image::png;
 use crate::measure::metrics::flip;
-use crate::plan::Rasterizer;
 use crate::{Error, Result};
 
 /// Largest mean FLIP against a reference of the same driver build. Its images are the same to the bit on one processor; the
@@ -34,7 +33,8 @@ pub(super) fn check(suite: &Suite, case: &SceneCase) -> Result<Finding> {
     let options = &suite.options;
     let mut drawn = None;
     with_device(options, |gpu| {
-        drawn = Some(frames::draw(gpu, options, case, Rasterizer::Graphics, false)?);
+        let first = case.rasterizers()[0];
+        drawn = Some(frames::draw(gpu, options, case, first, false)?);
         Ok(finding(&[], String::new()))
     })?;
     let Some(picture) = drawn else { return Err(Error::Check("nothing was drawn".into())) };

@@ -3,7 +3,8 @@
 
 use std::path::Path;
 
-use crate::plan::ViewMode;
+use crate::ladder::Ladder;
+use crate::plan::{Rasterizer, ViewMode};
 use crate::scene::{self, Camera, Scene};
 use crate::{Error, Result};
 
@@ -12,6 +13,9 @@ pub const SIZE: [u32; 2] = [128, 96];
 
 /// Time of the pictures, s: some way into what the wind does.
 const TIME: f64 = 3.0;
+
+/// Both ways of finding samples.
+pub const RASTERIZERS: [Rasterizer; 2] = [Rasterizer::Graphics, Rasterizer::Tiles];
 
 /// One picture of the suite.
 pub struct SceneCase {
@@ -27,6 +31,8 @@ pub struct SceneCase {
     wind: f64,
     knobs: &'static [(&'static str, f64)],
     pub mode: ViewMode,
+    /// Whether near trees are their models' meshes, which compute tiles alone draw.
+    pub meshes: bool,
 }
 
 const PLAIN: &str = "[terrain]\nextent = 1200.0\nalbedo = [0.13, 0.11, 0.08]\n\
@@ -46,7 +52,10 @@ const GROVE: SceneCase = SceneCase {
     wind: 0.0,
     knobs: &[],
     mode: ViewMode::Radiance,
+    meshes: false,
 };
+/// The same with the nearest trees as meshes.
+const NEAR: SceneCase = SceneCase { name: "near", meshes: true, ..GROVE };
 /// Hills a kilometre and more away.
 const HILLS: SceneCase = SceneCase {
     name: "hills",
@@ -60,6 +69,8 @@ const ABOVE: SceneCase =
 /// From the direction of the sun, 35 degrees high: the shadow of the eye is in the middle of the picture.
 const HOTSPOT: SceneCase =
     SceneCase { name: "hotspot", camera: ([550.0, 513.4, 70.0], [600.0, 600.0, 0.0], 40.0), ..GROVE };
+/// Meshes down to trees so small that some in a small picture are.
+const NEAR_LADDER: &str = "mesh:32,zfield,shader-map";
 /// The whole forest by the shader-map.
 const FAR: &[(&str, f64)] = &[("zfield_min_pixels", 64.0)];
 
@@ -94,6 +105,10 @@ pub const ALL: &[SceneCase] = &[
     SceneCase { name: "light-transfer", knobs: &[("transfer_bands", 1.0)], ..GROVE },
     SceneCase { name: "all-orders", knobs: &[("indirect", 1.0)], ..HILLS },
     SceneCase { name: "windy", wind: 15.0, ..GROVE },
+    NEAR,
+    SceneCase { name: "near-inside", camera: ([600.0, 600.0, 3.0], [640.0, 590.0, 6.0], 80.0), ..NEAR },
+    SceneCase { name: "near-all-orders", sun: [45.0, 12.0, 1.0], knobs: &[("indirect", 1.0)], ..NEAR },
+    SceneCase { name: "near-windy", wind: 15.0, ..NEAR },
     SceneCase { name: "mode-fractions", mode: ViewMode::Fractions, ..GROVE },
     SceneCase { name: "mode-coverage", mode: ViewMode::Coverage, ..ABOVE },
     SceneCase { name: "mode-lod", mode: ViewMode::Lod, ..HILLS },
@@ -108,6 +123,11 @@ pub fn find(name: &str) -> Result<&'static SceneCase> {
 }
 
 impl SceneCase {
+    /// What finds the samples of its trees: what must hold of a frame must hold of each.
+    pub fn rasterizers(&self) -> &'static [Rasterizer] {
+        if self.meshes { &[Rasterizer::Tiles] } else { &RASTERIZERS }
+    }
+
     /// The scene, with coarse views and small maps so that it is quick to bake and draw, and its camera.
     pub fn load(&self) -> Result<(Scene, Camera)> {
         let (position, target, fov) = self.camera;
@@ -122,6 +142,7 @@ impl SceneCase {
         );
         let mut scene = scene::parse(&text, Path::new(self.name))?;
         scene.time = TIME;
+        scene.ladder = if self.meshes { NEAR_LADDER.parse().unwrap_or_default() } else { Ladder::BN12 };
         for (knob, value) in self.knobs {
             scene.settings.set(knob, *value)?;
         }

@@ -1,7 +1,7 @@
 //! Compute tiles against the graphics pipeline: two ways to the same samples.
 
 use super::images::encode;
-use super::scenes::{SIZE, SceneCase};
+use super::scenes::{RASTERIZERS, SIZE, SceneCase};
 use super::{Comparison, Finding, Options, finding, frames, with_device};
 use crate::measure::metrics::flip;
 use crate::plan::Rasterizer;
@@ -18,7 +18,7 @@ const BIAS: f64 = 0.1;
 pub(super) fn check(options: &Options, case: &SceneCase) -> Result<Finding> {
     let mut drawn = Vec::new();
     with_device(options, |gpu| {
-        for rasterizer in frames::RASTERIZERS {
+        for rasterizer in RASTERIZERS {
             drawn.push(frames::draw(gpu, options, case, rasterizer, false)?.rgb());
         }
         Ok(finding(&[], String::new()))

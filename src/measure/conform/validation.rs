@@ -18,7 +18,7 @@ pub(super) const ALL: &[Watch] = &[
 ];
 
 /// Scenes that use every pass between them.
-const SCENES: [&str; 3] = ["grove", "hills", "overcast"];
+const SCENES: [&str; 4] = ["grove", "hills", "overcast", "near"];
 
 /// Provokes a message, then draws without any.
 pub(super) fn check(options: &Options, (_, validation, hint): &Watch) -> Result<Finding> {
@@ -45,7 +45,8 @@ pub(super) fn check(options: &Options, (_, validation, hint): &Watch) -> Result<
         if few { (&SCENES[..1], &[true]) } else { (&SCENES, &[false, true]) };
     let mut frames_drawn = 0;
     for scene in scenes::ALL.iter().filter(|s| scenes.contains(&s.name)) {
-        for (layers, rasterizer) in targets.iter().flat_map(|l| frames::RASTERIZERS.map(|r| (*l, r))) {
+        let both = scene.rasterizers().iter();
+        for (layers, rasterizer) in targets.iter().flat_map(|l| both.clone().map(|r| (*l, *r))) {
             let gpu = open()?;
             let drawn = frames::draw(&gpu, options, scene, rasterizer, layers);
             let said = gpu.messages();

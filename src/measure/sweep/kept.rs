@@ -27,9 +27,9 @@ pub struct Subject {
     pub ladder: Option<String>,
 }
 
-/// A ladder as it is kept: not at all if it is the usual, as with results of before there was a choice.
+/// A ladder as it is kept: not at all if it is that of BN12, as with results of before there was a choice.
 pub fn unusual(ladder: &Ladder) -> Option<String> {
-    (*ladder != Ladder::default()).then(|| ladder.to_string())
+    (*ladder != Ladder::BN12).then(|| ladder.to_string())
 }
 
 impl From<&Identity> for Subject {

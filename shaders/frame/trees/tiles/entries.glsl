@@ -1,5 +1,5 @@
 // Lists of tiles: which trees' boxes reach into the pixels of which list, front to back. An entry is a tree in a list. Each of
-// BIN_LANES invocations takes an equal part of all steps, in the order of trees, counts how many entries go into each list, and
+// p.list_lanes invocations takes an equal part of all steps, in the order of trees, counts how many entries go into each list, and
 // once a prefix sum over (list, part) has said where, writes them: no atomics, so the order stays. A step is an entry, or the end
 // of a tree's entries: trees alone would be unequal parts, because the nearest are in thousands of lists, and entries alone would
 // let one invocation pass over any number of trees that are in none.
@@ -34,14 +34,14 @@ uvec2 list_at(uvec4 box, uint within) {
 // Calls VISIT(list, tree) for each entry of this invocation's part.
 #define FOR_ENTRIES(VISIT)                                                                              \
     uint lane = gl_GlobalInvocationID.x, trees = state.items[0].tree_count, total = spans.items[trees]; \
-    uint part = total > p.step_capacity ? 0u : (total + BIN_LANES - 1u) / BIN_LANES;                    \
+    uint part = total > p.step_capacity ? 0u : (total + p.list_lanes - 1u) / p.list_lanes;                    \
     uint now = min(lane * part, total), last = min(now + part, total);                                  \
     uint tree = tree_of(now, trees), next = spans.items[tree + 1u];                                     \
     uvec4 box = lists_of(tree);                                                                         \
     uvec2 at = list_at(box, now - spans.items[tree]);                                                   \
     while (now < last) {                                                                                \
         if (at.y < box.w) {                                                                             \
-            VISIT(at.y * p.lists_across + at.x, tree);                                                       \
+            VISIT(at.y * p.lists.x + at.x, tree);                                                       \
         }                                                                                               \
         now++;                                                                                          \
         at = at.x + 1u < box.z ? uvec2(at.x + 1u, at.y) : uvec2(box.x, at.y + 1u);                      \

@@ -5,7 +5,7 @@
 #include "frame/trees/tiles/order.glsl"
 #include "frame/trees/tiles/entries.glsl"
 
-#define COUNT(list, tree) counts.items[(list) * BIN_LANES + lane] += 1u
+#define COUNT(list, tree) counts.items[(list) * p.list_lanes + lane] += 1u
 
 void main() {
     FOR_ENTRIES(COUNT)

@@ -171,12 +171,12 @@ void main() {
     uvec2 corner = tile_corner();
     uint column = gl_LocalInvocationIndex, turns = 0u;
     uvec2 list_at = corner >> p.list_shift;
-    uint list = list_at.y * p.lists_across + list_at.x;
+    uint list = list_at.y * p.lists.x + list_at.x;
     bool whole = state.items[0].whole != 0u;
     uint first = 0u, end = state.items[0].tree_count;
     if (!whole) {
-        first = list > 0u ? texelFetch(ends, int(list * BIN_LANES) - 1).x : 0u;
-        end = texelFetch(ends, int((list + 1u) * BIN_LANES) - 1).x;
+        first = list > 0u ? texelFetch(ends, int(list * p.list_lanes) - 1).x : 0u;
+        end = texelFetch(ends, int((list + 1u) * p.list_lanes) - 1).x;
     }
     bool more = true, parted = end > first + PART;
     for (uint begin = first; more; begin += PART) {
