@@ -106,7 +106,7 @@ struct SceneReport<'a> {
 #[derive(serde::Serialize)]
 struct Trees<'a> {
     in_view: u32,
-    /// By the rung that draws them one by one.
+    /// By the nearest rung that has a part in drawing them one by one.
     by_rung: BTreeMap<&'static str, u32>,
     casters_by_cascade: &'a [u32],
 }
@@ -346,7 +346,7 @@ fn draw(
         bakes: states,
         passes: &frame.timing.passes,
         gpu_ms: frame.timing.passes.iter().map(|p| p.gpu_ms).sum(),
-        trees: trees(&frame),
+        trees: trees(&frame, plan),
         terrain_quads: frame.terrain_quads,
         seed_quads: frame.seed_quads,
         memory: Memory {
@@ -399,10 +399,12 @@ fn choose(args: &Args, gpu: &Gpu, scene: &Scene, time: Duration) -> Result<Choic
     kept::choose(&file, &subject, 1e3 * time.as_secs_f64())
 }
 
-fn trees(frame: &FrameReport) -> Trees<'_> {
+fn trees<'a>(frame: &'a FrameReport, plan: &Plan) -> Trees<'a> {
+    let [all, meshes] = [frame.trees.camera, frame.trees.meshes];
+    let near = plan.meshes.then_some((Rung::Mesh.name(), meshes));
     Trees {
-        in_view: frame.trees.camera,
-        by_rung: BTreeMap::from([(Rung::ZField.name(), frame.trees.camera)]),
+        in_view: all,
+        by_rung: near.into_iter().chain([(Rung::ZField.name(), all - meshes.min(all))]).collect(),
         casters_by_cascade: &frame.trees.cascades,
     }
 }
