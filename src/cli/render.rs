@@ -378,7 +378,7 @@ fn choose(args: &Args, gpu: &Gpu, scene: &Scene, time: Duration) -> Result<Choic
         size: args.scene.size,
         device: gpu.info().into(),
         rasterizer: args.rasterizer.chosen().map(|r| r.name().into()),
-        ladder: kept::unusual(&scene.ladder),
+        ladder: kept::kept_ladder(&scene.ladder),
     };
     let file = match &args.sweep {
         Some(file) => file.clone(),

@@ -107,7 +107,9 @@ pub fn plan(
             *far = eye;
         }
     }
-    for eye in farthest.into_values().flatten() {
+    let mut some: Vec<&Eye> = farthest.into_values().flatten().collect();
+    some.dedup_by(|a, b| std::ptr::eq(*a, *b));
+    for eye in some {
         let plan = Plan::for_path(scene, eye, &places, false, drawing, Some(gpu.info()))?;
         if largest.as_ref().is_none_or(|l| plan.bytes() > l.bytes()) {
             largest = Some(plan);

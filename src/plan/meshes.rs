@@ -6,12 +6,13 @@ use super::Plan;
 use super::items::Items;
 use super::names::resource;
 use crate::gpu::interface::{
-    DrawCommand, HIDING_STEPS, MESH_DRAWS, MESH_TREES, MeshFace, MeshKind, MeshTree,
+    DrawCommand, HIDING_STEPS, MESH_DRAWS, MESH_TREES, MESH_TRIANGLES, MeshFace, MeshKind, MeshTree,
 };
 use crate::gpu::{BufferDesc, Description, ImageDesc, vk};
 use crate::physics::levels::BARK_LEVELS;
 use crate::scene::mesh::Triangle;
 use crate::scene::{Distribution, Mesh, Scene, Species};
+use crate::{Error, Result};
 
 /// Format and bytes of the texels as which corners, faces and envelopes are read.
 const WORDS: (vk::Format, u64) = (vk::Format::R32G32B32A32_UINT, 16);
@@ -95,6 +96,18 @@ fn most_triangles(mesh: &Mesh) -> [u64; 2] {
     // Without foliage all are leaves.
     let bark = if leaves > 0 { all - leaves } else { 0 };
     [all + bark, all + all + bark * (BARK_LEVELS as u64 - 1)]
+}
+
+/// That no model can have more triangles with its levels of bark, before these are made, than can be drawn.
+pub(super) fn check_size(scene: &Scene) -> Result<()> {
+    match scene.species.iter().find(|s| most_triangles(&s.mesh)[0] > u64::from(MESH_TRIANGLES)) {
+        Some(species) => Err(Error::Usage(format!(
+            "species \"{}\" may have {} triangles with its levels of bark, and meshes of up to {MESH_TRIANGLES} are drawn: simplify the model",
+            species.name,
+            most_triangles(&species.mesh)[0]
+        ))),
+        None => Ok(()),
+    }
 }
 
 impl Plan {

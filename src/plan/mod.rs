@@ -252,6 +252,9 @@ impl Plan {
             plan.z_fields = all.clone().any(|p| plan.scene_in_range(scene, ground, *p));
             plan.meshes = plan.z_fields && all.any(|p| plan.scene_has_mesh_at(scene, ground, *p));
             if plan.meshes {
+                if ladder.without_meshes().is_some() {
+                    meshes::check_size(scene)?;
+                }
                 plan.mesh_texel = meshes::leaf_side(scene) / f64::from(scene.settings.mesh_shadow_texels);
             }
             if plan.z_fields && plan.sun {

@@ -66,10 +66,8 @@ fn hotspot_is_that_of_the_oracle_down_to_no_angle_at_all() {
                 format!("{at} a1 {a1} a2 {a2}: {out:?} {want}")
             });
             if p[0] == p[1] {
-                // Of an angle of nothing; but exp may be 3 ulp off.
-                let v = float(&out, 1);
                 assert_eq!(float(&out, 0), 0.0, "no angle between the same directions");
-                assert!((1.0 - 3.0 * EPS..=1.0).contains(&v), "largest at v = l: {v}");
+                assert_eq!(float(&out, 1), 1.0, "largest at v = l, exactly");
             }
         }
         angles.within(1.0, "angle, in units of its bound");

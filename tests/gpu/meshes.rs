@@ -289,6 +289,11 @@ fn what_meshes_take_is_planned_and_what_they_cannot_be_is_refused() {
     let fewer = planned(&tight, auto(None)).unwrap();
     assert!(!fewer.meshes && fewer.no_meshes.unwrap().contains("memory_mib"));
     assert!(planned(&tight, Drawing::from(ladder(NEAR))).is_err());
+    let mut large = scene.clone();
+    let mesh = Arc::make_mut(&mut large.species[0].mesh);
+    mesh.triangles = mesh.triangles.iter().cycle().take(530_000).cloned().collect();
+    let fewer = planned(&large, auto(None)).unwrap();
+    assert!(!fewer.meshes && fewer.no_meshes.unwrap().contains("simplify the model"));
     // A camera that comes nearer than the plan was made for is told so.
     let mut renderer =
         Renderer::new(&gpu, Arc::new(scene.clone()), of(&far, NEAR), &device::bake_meshes(&scene)).unwrap();

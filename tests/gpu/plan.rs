@@ -16,8 +16,6 @@ use canopy::plan::{Drawing, Plan, Rasterizer, TileBuffers};
 use canopy::scene::{Camera, Distribution, Scene};
 
 const SIZE: [u32; 2] = [64, 48];
-/// Most bytes that textures of a texel take: a few hundred for each of two on some devices.
-const TEXEL: u64 = 2048;
 const RASTERIZERS: [Rasterizer; 2] = [Rasterizer::Graphics, Rasterizer::Tiles];
 
 fn scene() -> Scene {
@@ -90,6 +88,11 @@ fn picture(gpu: &Gpu, scene: &Scene, mut plan: Plan) -> Picture {
 fn planned(gpu: &Gpu, scene: &Scene, how: impl Into<Drawing>) -> Plan {
     let eye = Eye::new(&scene.cameras[0], &scene.terrain, SIZE);
     Plan::for_eye(scene, &eye, true, how, Some(gpu.info())).unwrap()
+}
+
+/// Most bytes that textures of a texel take, of which there are a few: on a GPU each is padded to some hundreds.
+fn texel(gpu: &Gpu) -> u64 {
+    if gpu.info().kind == "cpu" { 1024 } else { 2048 }
 }
 
 /// All but the fractions, which tell lit from shadowed where there is no sun too. The two are drawn by other variants of a program, in
@@ -468,7 +471,7 @@ fn without_sunlight(gpu: &Gpu, mut scene: Scene, rasterizer: Rasterizer) {
     // One texel a band stands for the transfer that nobody reads, and two for the tables.
     assert!(!overcast.has("light transfer of a") && overcast.bytes(resource::TRANSFER) < 1 << 14);
     let [with, without] = [&day, &overcast].map(|d| d.bytes(resource::PAIR_TABLES));
-    assert!(without <= TEXEL && with >= 6 * 6 * 18 * 8, "{with} {without}");
+    assert!(without <= texel(gpu) && with >= 6 * 6 * 18 * 8, "{with} {without}");
     assert!(overcast.planned < day.planned);
     assert!(reduced.linear.as_ref().unwrap().coverage.iter().any(|c| *c > 0.5), "no tree is seen");
     assert!(same_light(gpu, &reduced, &picture(gpu, &scene, unreduced)));
@@ -568,7 +571,9 @@ fn one_representation(rasterizer: Rasterizer) {
     let plan = planned(&gpu, &scene, how(Ladder::ZFIELD));
     let (trees, reduced) = drawn(&gpu, &scene, plan.clone());
     assert!(
-        trees.draws(shown) && !trees.has("pair tables of a") && trees.bytes(resource::PAIR_TABLES) <= TEXEL
+        trees.draws(shown)
+            && !trees.has("pair tables of a")
+            && trees.bytes(resource::PAIR_TABLES) <= texel(&gpu)
     );
     assert!(reduced == picture(&gpu, &scene, Plan { pair_tables: true, ..plan }));
     // No tree stands by itself where the shader-map shows all.
@@ -665,8 +670,9 @@ fn one_species_has_one_density() {
     four.list(&scene);
     let (four, whole) = drawn(&gpu, &scene, four);
     let [two, four] = [two, four].map(|d| d.bytes(resource::COVERAGE));
-    // But for the padding of allocations, which takes whole tiles of a texture on some devices.
-    assert!(four.abs_diff(2 * two) < four / 8, "{two} {four}");
+    // But for the padding of allocations, which takes whole tiles of a texture on a GPU.
+    let padding = four / if gpu.info().kind == "cpu" { 50 } else { 8 };
+    assert!(four.abs_diff(2 * two) < padding, "{two} {four}");
     assert!(reduced == whole);
     let one = scene.species[0].clone();
     for (count, layers) in [(3, 1), (4, 2), (8, 3)] {

@@ -142,7 +142,10 @@ impl SceneCase {
         );
         let mut scene = scene::parse(&text, Path::new(self.name))?;
         scene.time = TIME;
-        scene.ladder = if self.meshes { NEAR_LADDER.parse().unwrap_or_default() } else { Ladder::BN12 };
+        scene.ladder = match self.meshes {
+            true => NEAR_LADDER.parse().map_err(|e| Error::Usage(format!("{}: {e}", self.name)))?,
+            false => Ladder::BN12,
+        };
         for (knob, value) in self.knobs {
             scene.settings.set(knob, *value)?;
         }

@@ -28,7 +28,7 @@ pub struct Subject {
 }
 
 /// A ladder as it is kept: not at all if it is that of BN12, as with results of before there was a choice.
-pub fn unusual(ladder: &Ladder) -> Option<String> {
+pub fn kept_ladder(ladder: &Ladder) -> Option<String> {
     (*ladder != Ladder::BN12).then(|| ladder.to_string())
 }
 

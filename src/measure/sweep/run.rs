@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::design::{HOME, Setting, Swept, most_accurate, one_at_a_time, product};
 use super::judge;
-use super::kept::unusual;
+use super::kept::kept_ladder;
 use super::result::{CameraError, Identity, Point, SWEEP_SCHEMA_VERSION, Sample, SweepResult, Time};
 use crate::camera::{Eye, auto_exposure};
 use crate::gpu::{Gpu, Stamps, TimingOptions};
@@ -153,7 +153,7 @@ fn empty(gpu: &Gpu, request: &Request, finest: &Settings) -> Result<SweepResult>
         most_accurate: finest.clone(),
         knobs: request.knobs.iter().map(Swept::label).collect(),
         rasterizer: request.rasterizer.map(|r| r.name().into()),
-        ladder: unusual(&request.scene.ladder),
+        ladder: kept_ladder(&request.scene.ladder),
         rounds: request.rounds,
         device: gpu.info().into(),
         cpu: (host.cpu.clone(), host.threads),

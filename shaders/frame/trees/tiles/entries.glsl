@@ -34,7 +34,7 @@ uvec2 list_at(uvec4 box, uint within) {
 // Calls VISIT(list, tree) for each entry of this invocation's part.
 #define FOR_ENTRIES(VISIT)                                                                              \
     uint lane = gl_GlobalInvocationID.x, trees = state.items[0].tree_count, total = spans.items[trees]; \
-    uint part = total > p.step_capacity ? 0u : (total + p.list_lanes - 1u) / p.list_lanes;                    \
+    uint part = total > p.step_capacity ? 0u : (total + p.list_lanes - 1u) / p.list_lanes;              \
     uint now = min(lane * part, total), last = min(now + part, total);                                  \
     uint tree = tree_of(now, trees), next = spans.items[tree + 1u];                                     \
     uvec4 box = lists_of(tree);                                                                         \

@@ -7,10 +7,10 @@
 
 layout(std430, binding = 4) writeonly buffer Entries { uint items[]; } entries;
 
-#define WRITE(list, tree)                          \
-    uint slot = (list) * p.list_lanes + lane;         \
-    uint to = counts.items[slot];                  \
-    entries.items[to] = tree;                      \
+#define WRITE(list, tree)                     \
+    uint slot = (list) * p.list_lanes + lane; \
+    uint to = counts.items[slot];             \
+    entries.items[to] = tree;                 \
     counts.items[slot] = to + 1u
 
 void main() { FOR_ENTRIES(WRITE) }
