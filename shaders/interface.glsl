@@ -63,6 +63,9 @@ struct View {
     ivec2 grid_camera;                // camera's cell of the terrain's finest grid
     vec2 grid_offset;                 // camera's position in that cell, m
     vec2 quad_offset;                 // camera's position in that quad, m
+    vec2 shift;                       // by which the picture is shifted, in clip space: its pixels are means of frames with several shifts
+    uint dither_turn;                 // what such a frame adds to the dithers of trees, 2^-32
+    uint frames_before;               // such frames of the same picture
     float hotspot_amplitude;          // a1 of BN12 eq. 8
     float hotspot_width;              // a2 of BN12 eq. 8, 1/rad
     float ground_contrast;            // a3 of BN12 eq. 10
@@ -415,6 +418,15 @@ struct CoverageParameters {
     float largest_radius;             // of a disc, m
     uint first_tile;                  // of this dispatch
     uint first_splat;                 // of this dispatch
+};
+
+// What summing frames up takes.
+struct AccumulationParameters {
+    uint pixels;                      // of the image
+    uint width;                       // of its rows
+    uint first;                       // sum of its first pixel
+    uint frame;                       // how many frames the sums hold already
+    float part;                       // 1 over the number of frames after the last, else 0
 };
 
 // What tone mapping takes.

@@ -2,6 +2,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
+#include "frame/camera.glsl"
 #include "frame/sky.glsl"
 
 layout(location = 0) out vec4 radiance;

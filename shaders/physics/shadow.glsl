@@ -30,10 +30,15 @@ float named_depth(float depth, uint name) { return uintBitsToFloat((floatBitsToU
 
 // What is looked for in the map is on the ground.
 const uint NO_TREE = 256u;
+// What is looked for in the map is on a mesh that is in it, single leaves and all.
+const uint ON_MESH = 257u;
 
 // Which of four casters leave the sun to points at the depths: those farther from it, and the tree that they are on, whose own shadow
 // is known otherwise. No tree is deeper than `reach`; what is farther before it and has its name has it by chance.
 vec4 caster_visibility(vec4 casters, vec4 depths, uint own, float reach) {
+    // A name moves a depth by up to 2^-16, half a texel of a map of 2048 and two of 8192: leaves would shade themselves, and by their tree's
+    // name. Without its bits a depth is at most as near as it was drawn.
+    casters = own == ON_MESH ? uintBitsToFloat(floatBitsToUint(casters) & ~255u) : casters;
     bvec4 farther = lessThanEqual(casters, depths);
     bvec4 same = equal(floatBitsToUint(casters) & 255u, uvec4(own)), near = lessThan(casters, depths + reach);
     return vec4(farther.x || (same.x && near.x), farther.y || (same.y && near.y), farther.z || (same.z && near.z),

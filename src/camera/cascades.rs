@@ -127,7 +127,7 @@ impl Cascade {
 /// The sphere around what the frustum sees between two distances from the eye: where its centre is along the view, and
 /// its radius. Depends on the field of view only, to the bit.
 fn slice_sphere(eye: &Eye, from: f64, to: f64) -> (f64, f64) {
-    let [tx, ty] = eye.tangents;
+    let [tx, ty] = eye.reach();
     let cosine = 1.0 / (1.0 + tx * tx + ty * ty).sqrt();
     let radius = |t: f64| {
         // The farthest of: the rim at both distances, and the middle at the far one.

@@ -23,6 +23,10 @@ pub struct Eye {
     /// Pixels that one metre covers at one metre, for everything that chooses a level of detail. Usually those of the image; a
     /// measurement may take few samples of what a sharper image would show.
     pub pixels_at_1m: f64,
+    /// By how much the picture is shifted to the right and down, pixels: a part of one, for frames of which a picture is the mean.
+    pub shift: [f64; 2],
+    /// What is looked for beyond the picture's edges, pixels: as far as shifts go.
+    pub margin: f64,
 }
 
 pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -65,7 +69,19 @@ impl Eye {
             tangents: [vertical * f64::from(size[0]) / f64::from(size[1]), vertical],
             size,
             pixels_at_1m: 0.5 * f64::from(size[1]) / vertical,
+            shift: [0.0; 2],
+            margin: 0.0,
         }
+    }
+
+    /// The picture's shift in clip space.
+    pub fn clip_shift(&self) -> [f64; 2] {
+        [0, 1].map(|k| 2.0 * self.shift[k] / f64::from(self.size[k]))
+    }
+
+    /// Tangents of half of what is looked for: the field of view and the margin.
+    pub fn reach(&self) -> [f64; 2] {
+        [0, 1].map(|k| self.tangents[k] * (1.0 + 2.0 * self.margin / f64::from(self.size[k])))
     }
 
     /// Clip from world coordinates relative to the eye, column by column: reverse Z with an infinite far plane, y down.
@@ -73,18 +89,18 @@ impl Eye {
         let [tx, ty] = self.tangents;
         let row_x = self.right.map(|v| v / tx);
         let row_y = self.up.map(|v| -v / ty);
-        let f = self.forward;
+        let (f, [sx, sy]) = (self.forward, self.clip_shift());
         let mut columns = [[0.0; 4]; 4];
         for k in 0..3 {
-            columns[k] = [row_x[k], row_y[k], 0.0, f[k]];
+            columns[k] = [row_x[k] + sx * f[k], row_y[k] + sy * f[k], 0.0, f[k]];
         }
         columns[3] = [0.0, 0.0, NEAR_PLANE, 0.0];
         columns
     }
 
-    /// The frustum's planes for points relative to the eye: left, right, bottom, top, near; inside is positive, metres.
+    /// The planes of the frustum and its margin, for points relative to the eye: left, right, bottom, top, near; inside is positive, metres.
     pub fn planes(&self) -> Vec<[f64; 4]> {
-        let [tx, ty] = self.tangents;
+        let [tx, ty] = self.reach();
         let side = |axis: [f64; 3], sign: f64, t: f64| {
             let n = normalize(add(self.forward.map(|v| v * t), axis, sign));
             [n[0], n[1], n[2], 0.0]
@@ -104,9 +120,9 @@ impl Eye {
         0.5 * f64::from(self.size[1]) / self.tangents[1]
     }
 
-    /// Unit vector through a corner of the image.
+    /// Unit vector through a corner of the image and its margin.
     pub fn corner(&self) -> [f64; 3] {
-        let [tx, ty] = self.tangents;
+        let [tx, ty] = self.reach();
         normalize(add(add(self.forward, self.right, tx), self.up, ty))
     }
 }

@@ -1,5 +1,6 @@
 //! What of a renderer is the image's: its targets, and the passes that draw to them. An image of another size gets another.
 
+use super::accumulation::Accumulation;
 use super::ground::Ground;
 use super::horizon::Horizon;
 use super::report::ReadBacks;
@@ -21,6 +22,7 @@ pub struct Canvas {
     /// What is drawn to.
     pub targets: ImageTargets,
     passes: Passes,
+    accumulation: Option<Accumulation>,
     tonemap: Tonemap,
 }
 
@@ -69,6 +71,7 @@ impl Canvas {
                 }
                 Rasterizer::Tiles => Passes::Tiles(Box::new(Seen::new(gpu, (scene, plan), world)?)),
             },
+            accumulation: Accumulation::new(gpu, plan)?,
             tonemap: Tonemap::new(gpu, plan)?,
         })
     }
@@ -161,6 +164,13 @@ impl Canvas {
     /// Records the display picture.
     pub fn resolve(&self, recorder: &mut Recorder, plan: &Plan, moment: Moment) {
         self.tonemap.record(recorder, &self.targets, plan, moment.exposure / moment.light.scale);
+    }
+
+    /// Adds frame `k` of a picture of several to their sums.
+    pub fn accumulate(&self, recorder: &mut Recorder, plan: &Plan, k: u32) {
+        if let Some(accumulation) = &self.accumulation {
+            recorder.stage("image", |r| accumulation.record(r, &self.targets, plan, k));
+        }
     }
 
     /// Has what the tiles find read back.

@@ -1,5 +1,6 @@
 //! A frame: every pass in order, in [`Renderer::submit`].
 
+pub mod accumulation;
 pub mod canvas;
 pub mod ground;
 pub mod horizon;
@@ -31,6 +32,7 @@ use crate::image::Picture;
 use crate::plan::Plan;
 use crate::scene::{Camera, Scene, Sun};
 use crate::{Error, Result};
+use accumulation::MARGIN;
 use canvas::Canvas;
 use report::{Began, ReadBacks};
 use shadows::Shadows;
@@ -40,6 +42,11 @@ use trees::tiles::TreeTiles;
 
 pub use report::{FrameReport, Ticket, Tiles};
 pub use world::{Forest, NearTrees, World};
+
+/// An eye that looks for all that the frames of a picture show.
+fn seen_by(eye: &Eye, plan: &Plan) -> Eye {
+    Eye { margin: if plan.accumulation > 1 { MARGIN } else { 0.0 }, ..*eye }
+}
 
 /// Draws a scene as its plan says.
 pub struct Renderer {
@@ -142,6 +149,8 @@ impl Renderer {
         let mut recorder = gpu.record_in(&self.ring)?;
         let (r, plan) = (&mut recorder, &self.plan);
         let stream = info_span!("stream").entered();
+        let eye = seen_by(moment.eye, plan);
+        let moment = Moment { eye: &eye, ..moment };
         let streamed = self.world.stream(r, (&self.scene, plan), moment)?;
         drop(stream);
 
@@ -149,7 +158,11 @@ impl Renderer {
         self.world.produce(r, &streamed);
         self.world.visibility(r);
         self.world.shadows(r);
-        self.canvas.draw(r, plan, &self.world, &streamed, moment);
+        for k in 0..plan.accumulation {
+            self.world.look(r, plan, (&streamed, moment), k)?;
+            self.canvas.draw(r, plan, &self.world, &streamed, moment);
+            self.canvas.accumulate(r, plan, k);
+        }
         self.canvas.resolve(r, plan, moment);
         let mut reads = ReadBacks::default();
         self.world.read(r, moment.cascades.len(), &mut reads)?;
@@ -196,7 +209,7 @@ impl Renderer {
     /// The shadow cascades of an eye.
     pub fn cascades(&self, eye: &Eye) -> Vec<Cascade> {
         let highest = self.world.terrain.tree.total_range()[1] + self.plan.tallest;
-        Shadows::cascades(&self.scene, &self.plan, eye, self.light.direction, highest)
+        Shadows::cascades(&self.scene, &self.plan, &seen_by(eye, &self.plan), self.light.direction, highest)
     }
 
     /// Puts the sun elsewhere, or gives it another irradiance.

@@ -1,7 +1,7 @@
 //! Streaming: which quads and tiles a moment needs, where in the caches they are, and what brings those that are new.
 
 use super::report::Tiles;
-use super::view::view;
+use super::view::{frame_view, view};
 use super::world::{Forest, World};
 use crate::camera::{Cascade, Eye, Light};
 use crate::forest::casters::CasterData;
@@ -77,7 +77,7 @@ impl World {
         self.terrain.upload(recorder, &draws)?;
         let seeds = self.forest.as_ref().map(|f| &f.seeds);
         let view = view(scene, plan, eye, (light, motion), cascades, seeds, self.terrain.tree.step());
-        recorder.upload(&self.view, 0, &[view])?;
+        recorder.upload(&self.view, 0, &[frame_view(view, eye, plan, 0)])?;
         let produced = Tiles {
             terrain: draws.fresh.1,
             seeds: trees.as_ref().map_or(0, |(seeds, _)| seeds.fresh.1)
@@ -88,6 +88,23 @@ impl World {
         let averages_from = plan.averages_from();
         let far_trees = draws.keys.iter().any(|quad| tree.farthest(*quad, eye.position) > averages_from);
         Ok(Streamed { draws, view, produced, evicted: self.evicted().since(before), far_trees, trees })
+    }
+
+    /// Has frame `k` of the picture, but the first, looked at as it is shifted.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when out of memory.
+    pub fn look(
+        &self,
+        recorder: &mut Recorder,
+        plan: &Plan,
+        (streamed, moment): (&Streamed, Moment),
+        k: u32,
+    ) -> Result<()> {
+        if k > 0 {
+            recorder.upload(&self.view, 0, &[frame_view(streamed.view, moment.eye, plan, k)])?;
+        }
+        Ok(())
     }
 
     /// Records the passes that produce what is new.

@@ -1,5 +1,6 @@
 //! The view buffer: everything of a frame that does not depend on the object drawn.
 
+use super::accumulation::{dither_turn, shift};
 use super::shadows::Shadows;
 use crate::camera::{Cascade, Eye, Light};
 use crate::forest::cull::bin_end;
@@ -11,6 +12,19 @@ use crate::scene::Scene;
 
 fn matrix(m: [[f64; 4]; 4]) -> [[f32; 4]; 4] {
     m.map(|c| c.map(|v| v as f32))
+}
+
+/// The view of frame `k` of those whose mean a picture is.
+pub fn frame_view(view: View, eye: &Eye, plan: &Plan, k: u32) -> View {
+    let frames = plan.accumulation;
+    let eye = Eye { shift: shift(k, frames, plan.samples), ..*eye };
+    View {
+        clip_from_world: matrix(eye.clip()),
+        shift: eye.clip_shift().map(|v| v as f32),
+        dither_turn: dither_turn(k, frames),
+        frames_before: k,
+        ..view
+    }
 }
 
 /// Fills the view of a frame.

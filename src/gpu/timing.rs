@@ -15,7 +15,7 @@ use super::context::{Gpu, device_error, lock};
 use crate::Result;
 
 /// Most scopes in one recording.
-pub(super) const MAX_SCOPES: u32 = 256;
+pub(super) const MAX_SCOPES: u32 = 2048;
 
 /// Where timestamps stand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -88,7 +88,7 @@ pub struct PassTime {
 /// What a recording measured.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Timing {
-    /// Passes in order. Without stamps around scopes their times are zero.
+    /// Passes in the order in which each is first recorded. Without stamps around scopes their times are zero.
     pub passes: Vec<PassTime>,
     /// Stages, each of several passes, in order.
     pub stages: Vec<PassTime>,
@@ -260,10 +260,27 @@ impl Gpu {
             });
             let (gpu_ms, start_ms) = (length as f64 * ms, start as f64 * ms);
             let time = PassTime { name: scope.name, gpu_ms, start_ms, cpu_ms: scope.cpu_ms, statistics };
-            if scope.pass { timing.passes.push(time) } else { timing.stages.push(time) }
+            add(if scope.pass { &mut timing.passes } else { &mut timing.stages }, time);
         }
         timing
     }
+}
+
+/// Adds a scope's time to those of scopes of its name, if there are any: what a recording does several times counts together.
+fn add(all: &mut Vec<PassTime>, time: PassTime) {
+    let Some(same) = all.iter_mut().find(|t| t.name == time.name) else {
+        return all.push(time);
+    };
+    same.gpu_ms += time.gpu_ms;
+    same.cpu_ms = same.cpu_ms.zip(time.cpu_ms).map(|(a, b)| a + b);
+    same.statistics = same.statistics.zip(time.statistics).map(|(a, b)| PipelineStatistics {
+        input_vertices: a.input_vertices + b.input_vertices,
+        vertex_invocations: a.vertex_invocations + b.vertex_invocations,
+        clipping_invocations: a.clipping_invocations + b.clipping_invocations,
+        clipping_primitives: a.clipping_primitives + b.clipping_primitives,
+        fragment_invocations: a.fragment_invocations + b.fragment_invocations,
+        compute_invocations: a.compute_invocations + b.compute_invocations,
+    });
 }
 
 /// Ticks from one stamp to another, each with its availability, of a counter with so many valid bits that may wrap.
@@ -283,6 +300,24 @@ fn signed_difference(a: u64, b: u64, bits: u32) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn scopes_of_one_name_count_together() {
+        let scope = |name: &str, start_ms, gpu_ms, cpu_ms| PassTime {
+            name: name.into(),
+            gpu_ms,
+            start_ms,
+            cpu_ms,
+            statistics: None,
+        };
+        let mut all = Vec::new();
+        for time in
+            [scope("a", 0.0, 1.0, Some(1.0)), scope("b", 1.0, 2.0, None), scope("a", 3.0, 4.0, Some(5.0))]
+        {
+            add(&mut all, time);
+        }
+        assert_eq!(all, [scope("a", 0.0, 5.0, Some(6.0)), scope("b", 1.0, 2.0, None)]);
+    }
 
     #[test]
     fn stamps_missing_or_backwards_are_no_times() {

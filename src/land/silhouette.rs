@@ -210,7 +210,7 @@ fn section(
 
 /// The four edges of what the eye sees, as directions.
 fn corners(eye: &Eye) -> [[f64; 3]; 4] {
-    let [tx, ty] = eye.tangents;
+    let [tx, ty] = eye.reach();
     [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
         .map(|(i, j)| add(add(eye.forward, eye.right, i * tx), eye.up, j * ty))
 }
@@ -224,7 +224,7 @@ fn view_distance(eye: &Eye, lowest: f64) -> f64 {
 
 /// First azimuth and width of what the eye sees, radians from east to north.
 fn azimuths(eye: &Eye) -> (f64, f64) {
-    let [tx, ty] = eye.tangents;
+    let [tx, ty] = eye.reach();
     // Straight up or down in view: every azimuth is.
     let (f, r, u) = (eye.forward[2], eye.right[2], eye.up[2]);
     if r.abs() <= tx * f.abs() && u.abs() <= ty * f.abs() {

@@ -89,6 +89,8 @@ pub struct Plan {
     pub size: [u32; 2],
     /// Samples a pixel.
     pub samples: u32,
+    /// Frames whose mean a picture is, each shifted by a part of a pixel.
+    pub accumulation: u32,
     /// Layers of the image apart: sun, sky, coverage, species.
     pub layers: bool,
     /// Whether a sun shines.
@@ -286,6 +288,7 @@ impl Plan {
             tile_shortcuts: true,
             size: eye.size,
             samples: check::samples(s.samples, device),
+            accumulation: s.accumulation,
             layers,
             sun: scene.sun.shines(),
             wind: false,

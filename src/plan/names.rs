@@ -50,6 +50,8 @@ pub mod pass {
     pub const TREE_LIGHT: &str = "tree light";
     /// The graphics pipeline: trees.
     pub const TREES: &str = "trees";
+    /// Sums of the frames whose mean a picture is.
+    pub const ACCUMULATION: &str = "accumulation";
     /// The picture for display.
     pub const TONE_MAP: &str = "tone map";
 }
@@ -168,6 +170,8 @@ pub mod resource {
     pub const CASCADES: &str = "shadow cascades";
     /// Depth of the picture.
     pub const DEPTH: &str = "depth";
+    /// Sums of the frames whose mean a picture is.
+    pub const SUMS_OF_FRAMES: &str = "sums of frames";
     /// Picture for display.
     pub const PICTURE: &str = "picture";
     /// Quad of terrain that each sample sees.

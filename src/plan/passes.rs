@@ -134,6 +134,12 @@ impl Plan {
         if self.z_fields && !tiles {
             add(pass::TREES, "trees within range");
         }
+        if self.accumulation > 1 {
+            add(
+                pass::ACCUMULATION,
+                "a picture is the mean of several frames: all before it, from the sky on, is drawn once for each",
+            );
+        }
         add(pass::TONE_MAP, "the picture for display");
     }
 }

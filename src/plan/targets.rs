@@ -27,6 +27,11 @@ impl Plan {
         self.colors().iter().map(|c| c.1).collect()
     }
 
+    /// Whether a colour image holds what there are means of: all do but that of species.
+    pub fn is_mean(&self, (_, format): &(&str, vk::Format)) -> bool {
+        *format == RADIANCE
+    }
+
     /// What a frame draws to.
     pub(super) fn list_targets(&self, scene: &Scene, items: &mut Items) {
         if self.cascades > 0 {
@@ -70,6 +75,12 @@ impl Plan {
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         all.push(BufferDesc::new(resource::PICTURE, pixels * 4).into());
         items.add("target", "image", reason, all);
+        if self.accumulation > 1 {
+            let reason = format!("a picture is the mean of {} frames", self.accumulation);
+            let images = self.colors().iter().filter(|c| self.is_mean(c)).count() as u64;
+            let sums = BufferDesc::new(resource::SUMS_OF_FRAMES, pixels * images * 16);
+            items.add("target", "sums of frames", reason, [sums]);
+        }
     }
 
     /// What tiles find of each sample.

@@ -3,6 +3,7 @@
 #[path = "../common/device.rs"]
 mod device;
 
+mod accumulation;
 mod casters;
 mod coverage;
 mod cull;

@@ -76,7 +76,7 @@ float sun_left(Tree t, Species kind, vec3 world, vec3 n, float own) {
     float reach = 4.0 * kind.scale_to_metres.z * t.scale * deeper;
     vec3 facing = dot(n, v.sun_direction) < 0.0 ? -n : n;
     vec2 gradient = leaves ? plane_gradient(facing, v.cascade_x, v.cascade_y, v.sun_direction) : vec2(0.0);
-    float visible = sun_visibility(shadow_map, at, gradient, turn, cascade, leaves ? NO_TREE : caster_name(t.identity), leaves ? 0.0 : reach);
+    float visible = sun_visibility(shadow_map, at, gradient, turn, cascade, leaves ? ON_MESH : caster_name(t.identity), leaves ? 0.0 : reach);
     return (leaves ? 1.0 : own) * (cascade_of(t) < MAX_CASCADES ? visible : 1.0);
 }
 
@@ -156,7 +156,7 @@ vec3 place_of(ivec2 pixel, uint samples) {
     for (uint k = 0u; k < SAMPLES; k++) {
         vec2 offset = vec2(pixel) + 0.5 + sample_offset(k, SAMPLES) - 0.5 * vec2(p.size);
         float deep = view.v.clip_from_world[3].z / max(surface_depth(pixel, int(k)), 1e-30);
-        sum += (samples >> k & 1u) != 0u ? deep * (camera.forward + offset.x * camera.right + offset.y * camera.down) : vec3(0.0);
+        sum += (samples >> k & 1u) != 0u ? deep * (camera.middle + offset.x * camera.right + offset.y * camera.down) : vec3(0.0);
     }
     return sum / float(bitCount(samples));
 }

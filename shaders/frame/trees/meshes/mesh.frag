@@ -4,6 +4,7 @@
 #include "interface.glsl"
 #include "physics/hash.glsl"
 #include "physics/masks.glsl"
+#include "frame/samples.glsl"
 #include "frame/trees/meshes/opacity.glsl"
 
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
@@ -14,8 +15,18 @@ layout(location = 1) flat in uvec4 what;
 layout(location = 0) out uint seen;
 
 void main() {
-    float opacity = mask_opacity(masks, uv, dFdx(uv), dFdy(uv), what.z, view.v.footprint);
-    uint some = mesh_mask(covered_samples(opacity, unit(what.w), SAMPLES), what.w, SAMPLES);
+    // Each sample stands for a square of 1/sqrt(SAMPLES) pixels a side, and looks at that much of the mask around itself: needles that are
+    // thinner than a pixel are then sharp, and what is seen of a card is what there is of it. Even opacity covers as many samples as
+    // it is of all: their thresholds are evenly spaced.
+    vec2 across = dFdx(uv), down = dFdy(uv);
+    float wider = view.v.footprint - 0.5 * log2(float(SAMPLES));
+    uint some = 0u;
+    for (uint k = 0u; k < SAMPLES; k++) {
+        vec2 offset = sample_offset(k, SAMPLES);
+        float opacity = mask_opacity(masks, uv + offset.x * across + offset.y * down, across, down, what.z, wider);
+        float threshold = fract(unit(what.w) + float(k) / float(SAMPLES));
+        some |= opacity > threshold ? 1u << k : 0u;
+    }
     seen = what.x;
     gl_SampleMask[0] = int(some & what.y);
 }

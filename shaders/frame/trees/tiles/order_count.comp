@@ -13,14 +13,16 @@ layout(std140, binding = 3) uniform SpeciesTable { Species items[MAX_SPECIES]; }
 layout(std430, binding = 4) readonly buffer Commands { DrawCommand items[]; } commands;
 layout(std430, binding = 5) writeonly buffer Keys { uint items[]; } keys;
 layout(std430, binding = 6) buffer Counts { uint items[]; } counts;
-layout(std430, binding = 7) writeonly buffer State { TileState items[]; } state;
+layout(std430, binding = 7) buffer State { TileState items[]; } state;
 
 void main() {
     uint lane = gl_GlobalInvocationID.x;
     for (uint bin = 0u; bin < DEPTH_BINS; bin++) counts.items[bin * ORDER_LANES + lane] = 0u;
     uint count = 0u;
     for (uint k = 0u; k < CAMERA_DRAWS; k++) count += commands.items[k].index_count / 6u;
-    if (lane == 0u) state.items[0] = TileState(count, 0u, 0u, 0u, uvec3((count + 63u) / 64u, 1u, 1u));
+    // What frames of the same picture ran out of stays.
+    uint overrun = view.v.frames_before > 0u ? state.items[0].overrun : 0u;
+    if (lane == 0u) state.items[0] = TileState(count, 0u, 0u, overrun, uvec3((count + 63u) / 64u, 1u, 1u));
     uint part = (count + ORDER_LANES - 1u) / ORDER_LANES, last = min((lane + 1u) * part, count);
     mat4 m = view.v.clip_from_world;
     vec3 forward = vec3(m[0].w, m[1].w, m[2].w);
