@@ -80,6 +80,9 @@ pub struct PassTime {
     /// CPU time of all threads while it ran, ms; with [`TimingOptions::apart`], passes only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cpu_ms: Option<f64>,
+    /// How often it was recorded; the times are of all of them together.
+    #[serde(skip)]
+    pub recorded: u32,
     /// What the pipeline did; passes only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub statistics: Option<PipelineStatistics>,
@@ -259,7 +262,14 @@ impl Gpu {
                 compute_invocations: f,
             });
             let (gpu_ms, start_ms) = (length as f64 * ms, start as f64 * ms);
-            let time = PassTime { name: scope.name, gpu_ms, start_ms, cpu_ms: scope.cpu_ms, statistics };
+            let time = PassTime {
+                name: scope.name,
+                gpu_ms,
+                start_ms,
+                cpu_ms: scope.cpu_ms,
+                recorded: 1,
+                statistics,
+            };
             add(if scope.pass { &mut timing.passes } else { &mut timing.stages }, time);
         }
         timing
@@ -271,6 +281,7 @@ fn add(all: &mut Vec<PassTime>, time: PassTime) {
     let Some(same) = all.iter_mut().find(|t| t.name == time.name) else {
         return all.push(time);
     };
+    same.recorded += time.recorded;
     same.gpu_ms += time.gpu_ms;
     same.cpu_ms = same.cpu_ms.zip(time.cpu_ms).map(|(a, b)| a + b);
     same.statistics = same.statistics.zip(time.statistics).map(|(a, b)| PipelineStatistics {
@@ -308,6 +319,7 @@ mod tests {
             gpu_ms,
             start_ms,
             cpu_ms,
+            recorded: 1,
             statistics: None,
         };
         let mut all = Vec::new();
@@ -316,7 +328,8 @@ mod tests {
         {
             add(&mut all, time);
         }
-        assert_eq!(all, [scope("a", 0.0, 5.0, Some(6.0)), scope("b", 1.0, 2.0, None)]);
+        let twice = PassTime { recorded: 2, ..scope("a", 0.0, 5.0, Some(6.0)) };
+        assert_eq!(all, [twice, scope("b", 1.0, 2.0, None)]);
     }
 
     #[test]

@@ -263,7 +263,7 @@ fn frame(report: FrameReport, [round, view]: [u32; 2], origin: u64) -> Frame {
 
 impl From<PassTime> for Scope {
     fn from(p: PassTime) -> Self {
-        let PassTime { name, gpu_ms, start_ms, cpu_ms, statistics } = p;
+        let PassTime { name, gpu_ms, start_ms, cpu_ms, statistics, .. } = p;
         Scope { name, start_ms, gpu_ms, cpu_ms, statistics }
     }
 }

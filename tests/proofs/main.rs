@@ -9,6 +9,7 @@ mod cost;
 #[allow(dead_code, unused_imports)] // Each test program uses its own part of this module.
 mod device;
 mod effects;
+mod near;
 mod planted;
 mod plot;
 mod popping;

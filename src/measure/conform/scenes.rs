@@ -96,6 +96,7 @@ pub const ALL: &[SceneCase] = &[
     SceneCase { name: "inside", camera: ([600.0, 600.0, 3.0], [640.0, 590.0, 6.0], 80.0), ..GROVE },
     SceneCase { name: "telephoto", camera: ([200.0, 200.0, 40.0], [600.0, 600.0, 5.0], 4.0), ..GROVE },
     SceneCase { name: "one-sample", knobs: &[("samples", 1.0)], ..GROVE },
+    SceneCase { name: "accumulated", knobs: &[("accumulation", 4.0)], ..GROVE },
     SceneCase { name: "one-cascade", knobs: &[("cascades", 1.0)], ..ABOVE },
     SceneCase {
         name: "accurate-rays",
@@ -109,6 +110,7 @@ pub const ALL: &[SceneCase] = &[
     SceneCase { name: "near-inside", camera: ([600.0, 600.0, 3.0], [640.0, 590.0, 6.0], 80.0), ..NEAR },
     SceneCase { name: "near-all-orders", sun: [45.0, 12.0, 1.0], knobs: &[("indirect", 1.0)], ..NEAR },
     SceneCase { name: "near-windy", wind: 15.0, ..NEAR },
+    SceneCase { name: "near-accumulated", knobs: &[("accumulation", 4.0)], ..NEAR },
     SceneCase { name: "mode-fractions", mode: ViewMode::Fractions, ..GROVE },
     SceneCase { name: "mode-coverage", mode: ViewMode::Coverage, ..ABOVE },
     SceneCase { name: "mode-lod", mode: ViewMode::Lod, ..HILLS },
