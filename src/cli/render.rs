@@ -33,6 +33,7 @@ Examples:
   canopy render my.toml -o a.png --exr a.exr          your scene, and linear radiance in layers
   canopy render --size 320x240 --quality fast         small and quick
   canopy render --set samples=8 --set cascades=2      turn knobs; --help lists them all
+  canopy render --set accumulation=16 -o still.png    the mean of 16 frames, each shifted by a part of a pixel: a smooth still
   canopy render --view-mode fractions -o k.png        lit and shadowed ground and trees
   canopy render --budget 50ms                         the most accurate setting that `canopy sweep` found to hold 50 ms
   canopy render --frames 5 --json > report.json       warm timings for a script

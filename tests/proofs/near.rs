@@ -70,7 +70,8 @@ fn a_tree_as_mesh_over_as_z_field() {
         let away = height * 384.0 / 256.0 / (2.0 * 7.5f64.to_radians().tan());
         let eyes: Vec<Eye> = (0..50)
             .map(|k| {
-                let (z, a) = (0.087 + (0.996 - 0.087) * (f64::from(k) + 0.5) / 50.0, 2.399_963 * f64::from(k));
+                let (z, a) =
+                    (0.087 + (0.996 - 0.087) * (f64::from(k) + 0.5) / 50.0, 2.399_963 * f64::from(k));
                 let r = away * (1.0 - z * z).sqrt();
                 let position = [500.0 + r * a.cos(), 500.0 + r * a.sin(), 0.5 * height + away * z];
                 let target = [500.0, 500.0, 0.5 * height];
@@ -115,9 +116,10 @@ fn a_tree_as_mesh_over_as_z_field() {
 #[ignore = "minutes: 240 pictures"]
 fn a_dolly_from_five_metres_to_three_hundred() {
     const SIZE: [u32; 2] = [320, 240];
-    let scene = trees(&[("oak", &[[498.0, 506.0], [488.0, 525.0]]), ("pine", &[[506.0, 512.0], [512.0, 535.0]])]);
+    let scene =
+        trees(&[("oak", &[[498.0, 506.0], [488.0, 525.0]]), ("pine", &[[506.0, 512.0], [512.0, 535.0]])]);
     let gpu = device::open_with(&canopy::gpu::GpuOptions::default());
-    let mut renderer: Option<Renderer> = None;
+    let mut drawing: Option<Renderer> = None;
     let mut last: Option<Linear> = None;
     let mut changes: [Vec<f64>; 2] = Default::default();
     let away = |k: u32| 5.0 * 60f64.powf(f64::from(k) / 239.0);
@@ -125,12 +127,9 @@ fn a_dolly_from_five_metres_to_three_hundred() {
         let position = [501.0, 500.0 - away(k), 3.0];
         let camera = Camera { name: "c".into(), position, target: [500.0, 520.0, 5.0], vertical_fov: 40.0 };
         let eye = Eye::new(&camera, &scene.terrain, SIZE);
-        let made = renderer.take().unwrap_or_else(|| self::renderer(&gpu, &scene, &eye, "mesh:256,zfield:4,shader-map"));
-        let made = renderer.insert(made);
-        if let Err(e) = made.render_eye(&eye, 1.0) {
-            panic!("frame {k}: {e}");
-        }
-        let l = made.picture().unwrap().linear.unwrap();
+        let one = drawing.get_or_insert_with(|| renderer(&gpu, &scene, &eye, "mesh:256,zfield:4,shader-map"));
+        one.render_eye(&eye, 1.0).unwrap_or_else(|e| panic!("frame {k}: {e}"));
+        let l = one.picture().unwrap().linear.unwrap();
         if let Some(before) = &last {
             // Where trees are in either: the plain's edge against the sky goes through a row of pixels now and then.
             let tree = |i: &usize| l.coverage[*i].max(before.coverage[*i]) > 0.02;
@@ -151,6 +150,6 @@ fn a_dolly_from_five_metres_to_three_hundred() {
         println!("{what}: change over its local median at most {most:.2}, at {:.0} m", away(at as u32));
         assert!(most < 2.0, "{what}: {most} at frame {at}");
     }
-    drop(renderer);
+    drop(drawing);
     gpu.close().unwrap();
 }
