@@ -1,6 +1,7 @@
 //! Species to data: z-field views, occlusion, optics; cached on disk by content.
 
 pub mod cache;
+pub mod cards;
 mod correction;
 pub mod envelope;
 #[doc(hidden)]

@@ -3,6 +3,7 @@
 mod accuracy;
 mod bake;
 mod bench;
+mod cards;
 mod compare;
 mod conform;
 mod devices;
@@ -61,6 +62,8 @@ enum Command {
     Bake(bake::Args),
     /// Light on leaves by their envelopes, with one bounce, against paths traced through the tree, term by term.
     Leaves(leaves::Args),
+    /// Write a tree model as a cloud of textured cards (billboards), a model like any other, and measure how good it is.
+    Cards(cards::Args),
     /// Write a procedural tree as binary glTF.
     Tree(tree::Args),
     /// List what a scene requires, with reasons and bytes, without building any of it.
@@ -83,6 +86,7 @@ pub fn run() -> ExitCode {
         Command::Accuracy(args) => accuracy::run(&args),
         Command::Bake(args) => bake::run(&args),
         Command::Leaves(args) => leaves::run(&args),
+        Command::Cards(args) => cards::run(&args),
         Command::Tree(args) => tree::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Conform(args) => conform::run(&args),

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::surface::Surface;
 
 /// One material and its surface.
-pub(super) struct Part<'a> {
+pub(crate) struct Part<'a> {
     /// The material's name.
     pub name: &'static str,
     /// Geometry, z up.
@@ -84,7 +84,7 @@ fn png(image: &RgbaImage) -> Vec<u8> {
 }
 
 /// One mesh with a primitive, a material and a texture for each part.
-pub(super) fn glb(parts: &[Part]) -> Vec<u8> {
+pub(crate) fn glb(parts: &[Part]) -> Vec<u8> {
     let mut writer = Writer::default();
     let (mut primitives, mut materials, mut textures, mut images) = (vec![], vec![], vec![], vec![]);
     for (i, part) in parts.iter().enumerate() {

@@ -7,14 +7,14 @@
 
 mod bark;
 mod cards;
-mod export;
+pub(crate) mod export;
 mod keys;
 mod limits;
 mod parameters;
 mod random;
 mod skeleton;
 mod species;
-mod surface;
+pub(crate) mod surface;
 
 use std::str::FromStr;
 

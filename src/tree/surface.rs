@@ -7,7 +7,7 @@ use super::skeleton::{Skeleton, Stem};
 
 /// A surface of one material: z up, metres.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Surface {
+pub(crate) struct Surface {
     /// Vertex positions, m.
     pub positions: Vec<[f32; 3]>,
     /// Unit normals.
