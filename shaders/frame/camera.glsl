@@ -21,3 +21,6 @@ Camera camera_of(View v, vec2 size) {
     c.y = row_y * (0.5 * size.y);
     return c;
 }
+
+// The ray through a place of the picture, pixels from its centre.
+vec3 ray_through(Camera c, vec2 offset) { return c.middle + offset.x * c.right + offset.y * c.down; }

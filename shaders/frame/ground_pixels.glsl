@@ -113,7 +113,7 @@ GroundPoint point_at(ivec2 pixel, uint seen, vec2 size, Camera camera, out vec3 
         vec2 offset = vec2(pixel) + 0.5 + sample_offset(k, SAMPLES) - 0.5 * size;
         float depth = view.v.clip_from_world[3].z / surface_depth(pixel, int(k));
         quad = counts ? other : quad;
-        sum += counts ? depth * (camera.middle + offset.x * camera.right + offset.y * camera.down) : vec3(0.0);
+        sum += counts ? depth * ray_through(camera, offset) : vec3(0.0);
         count += counts ? 1.0 : 0.0;
     }
     vec3 position = sum / count;

@@ -65,7 +65,7 @@ Shown standing_before_sky(ivec2 pixel, uint sky, uint rows, ivec2 size) {
     for (uint k = 0u; k < SAMPLES; k++) {
         if ((sky >> k & 1u) == 0u) continue;
         vec2 offset = vec2(pixel) + 0.5 + sample_offset(k, SAMPLES) - 0.5 * vec2(size);
-        trees += standing_out(at, n, camera.middle + offset.x * camera.right + offset.y * camera.down, distance);
+        trees += standing_out(at, n, ray_through(camera, offset), distance);
     }
     trees /= float(bitCount(sky));
     vec3 sun = trees * max(at.tree_sun.rgb, 0.0), from_sky = trees * max(at.tree_sky.rgb, 0.0);

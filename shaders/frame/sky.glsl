@@ -4,8 +4,7 @@ layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 1) uniform sampler2DArray sky;
 
 vec3 sky_radiance() {
-    Camera camera = camera_of(view.v, vec2(2.0));
-    vec3 d = camera.middle + clip.x * camera.right + clip.y * camera.down;
+    vec3 d = ray_through(camera_of(view.v, vec2(2.0)), clip);
     float east = atan(d.x, d.y) * (0.5 / 3.141592653589793);
     float down = atan(length(d.xy), d.z) * (1.0 / 3.141592653589793);
     return textureLod(sky, vec3(east, clamp(down, 0.001, 0.999), 0.0), 0.0).rgb;

@@ -24,5 +24,8 @@ const uint HASH_THIN = 0x68e31da4u;
 const uint HASH_SPECIES = 0xb5297a4du;
 const uint HASH_SWAY = 0x9e6c63d1u;
 
+// How a tree's number of covered samples is rounded, in [0, 1): in frames of one picture by steps, 2^-32.
+float tree_dither(uint identity, uint turn) { return unit(hash(identity ^ HASH_DITHER) + turn); }
+
 // Name of a tree in the shadow maps, of 8 bits.
 uint caster_name(uint identity) { return hash(identity ^ HASH_DITHER) & 255u; }

@@ -139,7 +139,7 @@ fn parts() -> impl Iterator<Item = (f32, f32)> {
 }
 
 /// RGBA of a texture, white where there is none; wraps around.
-fn texel_of(texture: &Option<Arc<Texture>>, uv: Vec2) -> [u8; 4] {
+pub(super) fn texel_of(texture: &Option<Arc<Texture>>, uv: Vec2) -> [u8; 4] {
     let Some(texture) = texture else { return [255; 4] };
     let wrap = |x: f32, n: u32| ((x - x.floor()) * n as f32) as u32 % n;
     let at = 4 * (wrap(uv.y, texture.height) * texture.width + wrap(uv.x, texture.width)) as usize;

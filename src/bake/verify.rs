@@ -45,17 +45,16 @@ impl QualityReport {
     }
 }
 
-/// A gate for scripts.
+/// A gate for scripts: the worst silhouette agreement of `what`, between two that a message names, and what to raise for a better one.
 ///
 /// # Errors
-/// [`Error::Check`] if the worst silhouette agreement of `what` is less than `least`.
-pub fn demand(what: &str, min_iou: f64, least: f64) -> Result<()> {
+/// [`Error::Check`] if it is less than `least`.
+pub fn demand(what: &str, between: &str, min_iou: f64, least: f64, remedy: &str) -> Result<()> {
     if min_iou >= least {
         return Ok(());
     }
     Err(Error::Check(format!(
-        "{what}: from one direction the silhouettes of z-field and mesh agree to {min_iou:.4} only; {least} were asked for \
-         (raise view_rings, view_resolution or view_iterations)"
+        "{what}: from one direction the silhouettes of {between} agree to {min_iou:.4} only; {least} were asked for (raise {remedy})"
     )))
 }
 

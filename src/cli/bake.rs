@@ -170,7 +170,9 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let Some(least) = args.min_iou else { return Ok(()) };
     let last = report.species.iter().filter_map(|b| Some((b, b.verify.last()?)));
-    last.into_iter().try_for_each(|(b, q)| bake::demand(&b.name, q.iou_min, least))
+    let remedy = "view_rings, view_resolution or view_iterations";
+    last.into_iter()
+        .try_for_each(|(b, q)| bake::demand(&b.name, "z-field and mesh", q.iou_min, least, remedy))
 }
 
 /// Bakes one species and, if asked, compares.

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use canopy::bake::cards::{self, CardQuality, CardSettings};
 use canopy::scene::model::{load_model_bytes, load_named};
-use canopy::{Error, Result};
+use canopy::{Result, bake};
 
 use super::SCHEMA_VERSION;
 use super::options::PrintOptions;
@@ -96,15 +96,13 @@ pub fn run(args: &Args) -> Result<()> {
     } else if !args.print.quiet {
         output::print(&text(&report))?;
     }
-    let worst = report.verify.iter().map(|v| v.iou).fold(f64::INFINITY, f64::min);
-    match args.min_iou {
-        Some(least) if worst < least => Err(Error::Check(format!(
-            "{}: from one direction the silhouettes of cards and model agree to {worst:.4} only; {least} were asked for (raise \
-             --cards or --texels)",
-            report.model
-        ))),
-        _ => Ok(()),
-    }
+    let Some(least) = args.min_iou else { return Ok(()) };
+    bake::demand(&report.model, "cards and model", worst(&report), least, "--cards or --texels")
+}
+
+/// The least agreement from a direction.
+fn worst(r: &Report) -> f64 {
+    r.verify.iter().map(|v| v.iou).fold(f64::INFINITY, f64::min)
 }
 
 fn flatness(text: &str) -> std::result::Result<f32, String> {
@@ -131,10 +129,10 @@ fn text(r: &Report) -> String {
     if !r.verify.is_empty() {
         let n = r.verify.len() as f64;
         let mean = |of: fn(&CardQuality) -> f64| r.verify.iter().map(of).sum::<f64>() / n;
-        let worst = r.verify.iter().map(|v| v.iou).fold(f64::INFINITY, f64::min);
         text += &format!(
-            "silhouettes from {n} directions: IoU {:.4} in the mean, {worst:.4} at worst; coverage {:.4} of the model's\n",
+            "silhouettes from {n} directions: IoU {:.4} in the mean, {:.4} at worst; coverage {:.4} of the model's\n",
             mean(|v| v.iou),
+            worst(r),
             mean(|v| v.coverage_ratio)
         );
     }

@@ -102,5 +102,5 @@ void main() {
     bark_ratio = vec4(kind.bark_ratio, kind.bare_below);
     mean_sun = vec4(t.mean_sun, weight.x);
     mean_sky = vec4(t.mean_sky, lit.x);
-    own = vec4(unit(hash(t.identity ^ HASH_DITHER) + v.dither_turn), kind.leaf_shadow * sqrt(phase_angle), weight.y, hole.y);
+    own = vec4(tree_dither(t.identity, v.dither_turn), kind.leaf_shadow * sqrt(phase_angle), weight.y, hole.y);
 }

@@ -4,7 +4,9 @@ use glam::{Vec2, Vec3};
 use image::{Rgba, RgbaImage};
 
 use super::Card;
+use crate::bake::optics::texel_of;
 use crate::bake::surface::Surface;
+use crate::physics::tonemap;
 use crate::scene::Mesh;
 
 /// Samples a side of a texel.
@@ -91,7 +93,7 @@ fn resolve(mesh: &Mesh, surface: &Surface, size: [u32; 2], sides: &[Vec<Seen>; 2
     let mut image = RgbaImage::new(size[0], size[1]);
     for (pixel, (colour, count)) in image.pixels_mut().zip(&texels) {
         let linear = if *count > 0 { *colour / *count as f32 } else { mean };
-        let byte = |v: f32| (255.0 * encode(v.clamp(0.0, 1.0))).round() as u8;
+        let byte = |v: f32| (255.0 * tonemap::srgb(f64::from(v.clamp(0.0, 1.0)))).round() as u8;
         // From the threshold on at least a half.
         let alpha = if *count >= least {
             128 + 127 * (*count - least) / (SAMPLES * SAMPLES - least).max(1)
@@ -115,19 +117,7 @@ fn threshold(texels: &[(Vec3, u32)], covered: u32) -> u32 {
 /// Linear base colour of what a sample sees.
 fn color(mesh: &Mesh, surface: &Surface, seen: &Seen) -> Vec3 {
     let material = &mesh.materials[surface.faces[seen.face as usize].material as usize];
-    let factor = Vec3::from_slice(&material.base_color[..3]);
-    let Some(texture) = &material.texture else { return factor };
-    let place = |v: f32, n: u32| ((v.rem_euclid(1.0) * n as f32) as u32).min(n - 1);
-    let at =
-        4 * (place(seen.uv.y, texture.height) * texture.width + place(seen.uv.x, texture.width)) as usize;
-    factor * Vec3::from([0, 1, 2].map(|k| decode(f32::from(texture.rgba[at + k]) / 255.0)))
-}
-
-/// sRGB's curve (IEC 61966-2-1), and its inverse.
-fn encode(v: f32) -> f32 {
-    if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
-}
-
-fn decode(v: f32) -> f32 {
-    if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+    let texel = texel_of(&material.texture, seen.uv);
+    let linear = |k: usize| tonemap::linear(f64::from(texel[k]) / 255.0) as f32 * material.base_color[k];
+    Vec3::new(linear(0), linear(1), linear(2))
 }

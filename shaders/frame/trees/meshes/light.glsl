@@ -156,7 +156,7 @@ vec3 place_of(ivec2 pixel, uint samples) {
     for (uint k = 0u; k < SAMPLES; k++) {
         vec2 offset = vec2(pixel) + 0.5 + sample_offset(k, SAMPLES) - 0.5 * vec2(p.size);
         float deep = view.v.clip_from_world[3].z / max(surface_depth(pixel, int(k)), 1e-30);
-        sum += (samples >> k & 1u) != 0u ? deep * (camera.middle + offset.x * camera.right + offset.y * camera.down) : vec3(0.0);
+        sum += (samples >> k & 1u) != 0u ? deep * ray_through(camera, offset) : vec3(0.0);
     }
     return sum / float(bitCount(samples));
 }

@@ -3,7 +3,6 @@
 #extension GL_GOOGLE_include_directive : require
 #include "interface.glsl"
 #include "physics/hash.glsl"
-#include "physics/masks.glsl"
 #include "frame/samples.glsl"
 #include "frame/trees/meshes/opacity.glsl"
 

@@ -36,7 +36,7 @@ void main() {
     if (WIND) at = carried(motion_of(view.v), t.species, caster_name(t.identity), is, box, at);
     gl_Position = view.v.clip_from_world * vec4(world_from_model(t, at), 1.0);
     uv = corner_uv(corner);
-    uint dither = uint(unit(hash(t.identity ^ HASH_DITHER) + view.v.dither_turn) * 1024.0);
+    uint dither = uint(tree_dither(t.identity, view.v.dither_turn) * 1024.0);
     uint mask = mesh_mask(mesh_count(t), dither, SAMPLES);
     uint triangle = face - kinds.items[row].first_face;
     what = uvec4(mesh_seen(place, triangle), mask, is.x, hash2(t.identity, kinds.items[row].first_name + triangle) + view.v.dither_turn);

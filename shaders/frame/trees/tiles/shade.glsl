@@ -49,7 +49,7 @@ Shown shade(uint rank, vec2 offset, out float depth) {
     Species kind = species.items[species_row(t.species)];
     TreePlane plane = tree_plane(t, kind);
     Camera camera = camera_of(v, vec2(p.size));
-    vec3 direction = camera.middle + offset.x * camera.right + offset.y * camera.down;
+    vec3 direction = ray_through(camera, offset);
     // The eye c, and the ray's point on the plane through the centre, in tree space.
     vec3 q = to_tree(plane, direction), c = plane.far * plane.w;
     vec3 point = c - q * (plane.far / dot(plane.w, q));

@@ -105,7 +105,7 @@ void main() {
         s.toward[k] = project(b, plane.w);
     }
     s.closeness = 1.0 / plane.far;
-    s.dither = unit(hash(t.identity ^ HASH_DITHER) + v.dither_turn);
+    s.dither = tree_dither(t.identity, v.dither_turn);
     s.row = inner_columns(masks.items[hash(t.identity ^ HASH_MASK) % MASK_ROWS].xyz);
     for (uint k = 0u; k < SIGHT_TEXELS; k++) records.items[rank * SIGHT_TEXELS + k] = sight_words(s, k);
     ranked.items[rank] = index | s.draw << 30u;
