@@ -12,6 +12,7 @@
 #include "physics/handover.glsl"
 #include "physics/tables.glsl"
 #include "physics/transfer.glsl"
+#include "physics/harmonics.glsl"
 
 struct Arguments {
     uvec4 a;
@@ -81,6 +82,17 @@ void main() {
         case 16u: {
             float x = dot(transfer_decode(a), transfer_first(c.xyz)) + dot(transfer_decode(b), transfer_second(c.xyz));
             r.a.x = floatBitsToUint(max(1.0 + transfer_strength(sqrt(c.w)) * x, 0.0));
+            break;
+        }
+        // Eight of sixteen.
+        case 18u: {
+            float first[9], third[7], all[16];
+            harmonics(a.xyz, first);
+            harmonics_third(a.xyz, third);
+            for (int n = 0; n < 16; n++) all[n] = n < 9 ? first[n] : third[n - 9];
+            uint at = i.a.w;
+            r.a = floatBitsToUint(vec4(all[at], all[at + 1u], all[at + 2u], all[at + 3u]));
+            r.b = floatBitsToUint(vec4(all[at + 4u], all[at + 5u], all[at + 6u], all[at + 7u]));
             break;
         }
     }

@@ -4,6 +4,7 @@ pub mod correction;
 pub mod crown;
 pub mod forest;
 pub mod handover;
+pub mod harmonics;
 pub mod hash;
 pub mod indirect;
 pub mod leaf;

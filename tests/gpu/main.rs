@@ -14,6 +14,7 @@ mod faults;
 mod frugal;
 mod ground;
 mod handover;
+mod harmonics;
 mod in_flight;
 mod indirect;
 mod leaf;

@@ -34,6 +34,7 @@ pub enum Function {
     SelfShadow,
     Transfer,
     MeshMask,
+    Harmonics,
 }
 
 /// The results of a function for many arguments.
