@@ -17,6 +17,7 @@ pub(crate) mod optics;
 mod raster;
 mod scene;
 mod self_shadow;
+pub mod shells;
 pub(crate) mod surface;
 pub mod tables;
 mod transfer;

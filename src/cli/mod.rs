@@ -15,6 +15,7 @@ mod plan;
 mod reference;
 mod reflectance;
 mod render;
+mod shells;
 mod sweep;
 mod tree;
 
@@ -64,6 +65,8 @@ enum Command {
     Leaves(leaves::Args),
     /// Write a tree model as a cloud of textured cards (billboards), a model like any other, and measure how good it is.
     Cards(cards::Args),
+    /// Precompute forest far away as stacks of slices (shell textures), and measure how well they hide the ground.
+    Shells(shells::Args),
     /// Write a procedural tree as binary glTF.
     Tree(tree::Args),
     /// List what a scene requires, with reasons and bytes, without building any of it.
@@ -87,6 +90,7 @@ pub fn run() -> ExitCode {
         Command::Bake(args) => bake::run(&args),
         Command::Leaves(args) => leaves::run(&args),
         Command::Cards(args) => cards::run(&args),
+        Command::Shells(args) => shells::run(&args),
         Command::Tree(args) => tree::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Conform(args) => conform::run(&args),

@@ -12,12 +12,16 @@ use crate::scene::{Distribution, Scene, TreePosition};
 
 /// Points of a Wang tile, about.
 const POINTS: u32 = 256;
-/// Purposes of a tree's random numbers, as in `shaders/physics/hash.glsl`.
-const HASH_TURN: u32 = 0x51ed_270b;
-const HASH_SCALE: u32 = 0x2c1b_3c6d;
-const HASH_TINT: u32 = 0x297a_2d39;
-const HASH_THIN: u32 = 0x68e3_1da4;
-const HASH_SPECIES: u32 = 0xb529_7a4d;
+/// Purpose of a tree's random number, as in `shaders/physics/hash.glsl`: its rotation.
+pub const HASH_TURN: u32 = 0x51ed_270b;
+/// Its scale.
+pub const HASH_SCALE: u32 = 0x2c1b_3c6d;
+/// Its tint.
+pub const HASH_TINT: u32 = 0x297a_2d39;
+/// From which share of the full density on it stands.
+pub const HASH_THIN: u32 = 0x68e3_1da4;
+/// Its species.
+pub const HASH_SPECIES: u32 = 0xb529_7a4d;
 /// Purpose of the identity of a listed tree.
 const LISTED: u32 = 0x9e37_79b9;
 
@@ -78,8 +82,6 @@ impl Layout {
     /// Trees of a quad of `tiles` by `tiles` Wang tiles, in the shader's order; `quad` counts quads east and north from the
     /// terrain's south-west corner.
     pub fn trees(&self, scene: &Scene, quad: [i32; 2], tiles: i32) -> Vec<Candidate> {
-        let edge =
-            |x: i32, y: i32, axis: u32| hash2(scene.seed.wrapping_add(axis), hash2(x as u32, y as u32)) & 1;
         let side = f64::from(tiles) * self.tile_side;
         let (tile_side, full) = (self.tile_side as f32, self.density as f32);
         let mut found = Vec::new();
@@ -87,8 +89,7 @@ impl Layout {
         for k in 0..tiles * tiles {
             let within = [k % tiles, k / tiles];
             let (x, y) = (quad[0] * tiles + within[0], quad[1] * tiles + within[1]);
-            let kind = edge(x, y, 1) | edge(x, y + 1, 1) << 1 | edge(x, y, 2) << 2 | edge(x + 1, y, 2) << 3;
-            for (slot, point) in self.pattern.tiles[kind as usize].iter().enumerate() {
+            for (slot, point) in self.pattern.tiles[tile_kind(scene.seed, x, y)].iter().enumerate() {
                 let identity = hash2(scene.seed, hash2(x as u32, hash2(y as u32, slot as u32)));
                 let thin = unit(hash(identity ^ HASH_THIN)) * full;
                 let position = [0, 1].map(|c| (within[c] as f32 + point[c]) * tile_side);
@@ -119,6 +120,13 @@ impl Layout {
         }
         found
     }
+}
+
+/// Which of the sixteen tiles lies at a place of the plane, counted in tiles east and north: the colours of its edges come from a hash of
+/// the edge.
+pub fn tile_kind(seed: u32, x: i32, y: i32) -> usize {
+    let edge = |x: i32, y: i32, axis: u32| hash2(seed.wrapping_add(axis), hash2(x as u32, y as u32)) & 1;
+    (edge(x, y, 1) | edge(x, y + 1, 1) << 1 | edge(x, y, 2) << 2 | edge(x + 1, y, 2) << 3) as usize
 }
 
 /// The tree of a species' list; its position is from the terrain's south-west corner.

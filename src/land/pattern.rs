@@ -21,7 +21,10 @@ pub struct Pattern {
     pub distance: f64,
 }
 
-const TILES: usize = 16;
+/// Tiles of a set.
+pub const TILES: usize = 16;
+/// Half side of the patch around a corner that all tiles share, in minimal distances.
+pub const PATCH: f64 = 1.75;
 /// Darts that must miss in a row, a unit of area of r², before a region counts as full.
 const PATIENCE: f64 = 400.0;
 
@@ -30,7 +33,7 @@ impl Pattern {
     pub fn new(points: u32, seed: u32) -> Self {
         // Maximal Poisson-disk patterns hold about 0.70 / r² points per unit area.
         let r = (0.70 / f64::from(points.max(32))).sqrt();
-        let a = 1.75 * r;
+        let a = PATCH * r;
         let mut stream = Stream::new(seed);
         // 1. The corner patch, around the origin.
         let mut corner = Vec::new();
