@@ -35,7 +35,12 @@ impl Table {
 
     /// Adds a row of as many cells as there are headings.
     pub fn row<const N: usize>(&mut self, cells: [String; N]) {
-        self.rows.push(cells.into());
+        self.cells(cells.into());
+    }
+
+    /// The same of a table whose columns are as many as the data have.
+    pub fn cells(&mut self, cells: Vec<String>) {
+        self.rows.push(cells);
     }
 
     /// The table as text, indented.

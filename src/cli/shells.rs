@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use canopy::bake::shells::{self, March, Quality, Seam, ShellSettings, Shells};
+use canopy::bake::shells::{self, Coarse, March, ShellSettings, Shells, Verified};
 use canopy::{Result, bake, image, scene};
 
 use super::SCHEMA_VERSION;
@@ -60,8 +60,7 @@ struct Report {
     bytes: u64,
     cache: &'static str,
     seconds: f64,
-    verify: Vec<Quality>,
-    seams: Vec<Seam>,
+    verify: Option<Verified>,
     output: Option<String>,
 }
 
@@ -79,7 +78,6 @@ pub fn run(args: &Args) -> Result<()> {
     let (shells, cache) = Shells::load(&scene, settings, dir.as_deref(), args.print.quiet)?;
     let seconds = start.elapsed().as_secs_f64();
     let verify = args.verify.map(|n| shells::verify(&scene, &shells, n, args.rays)).transpose()?;
-    let seams = args.verify.map_or(Vec::new(), |_| shells::seams(&shells).into());
     if let Some(path) = &args.output {
         let (rgb, size) = shells::picture(&shells, scene.seed);
         image::write_png(path, &rgb, size)?;
@@ -95,8 +93,7 @@ pub fn run(args: &Args) -> Result<()> {
         bytes: shells.bytes(),
         cache: cache.name(),
         seconds,
-        verify: verify.unwrap_or_default(),
-        seams,
+        verify,
         output: args.output.as_ref().map(|p| p.display().to_string()),
     };
     if args.print.json {
@@ -121,24 +118,63 @@ fn text(r: &Report) -> String {
         r.cache,
         r.seconds
     );
-    if r.verify.is_empty() {
-        return text;
+    if let Some(v) = &r.verify {
+        text += &verified(v);
     }
+    text
+}
+
+/// Tables of what was found.
+fn verified(v: &Verified) -> String {
+    let plus = |difference: f64, error: f64| format!("{difference:+.4} ±{error:.4}");
     let headings = ["zenith", "density", "meshes"].into_iter().chain(March::ALL.map(March::name));
-    let mut cover = Table::new(0, &headings.collect::<Vec<_>>());
-    for q in &r.verify {
-        let [a, b, c] = q.stack.map(|s| format!("{:+.4} ±{:.4}", s.difference, s.error));
+    let mut angles = Table::new(0, &headings.collect::<Vec<_>>());
+    for q in &v.angles {
+        let [a, b, c] = q.stack.map(|s| plus(s.difference, s.error));
         let truth = format!("{:.4} ±{:.4}", q.truth, q.error);
-        cover.row([format!("{:.0}°", q.zenith), format!("{}", q.share), truth, a, b, c]);
+        angles.row([format!("{:.0}°", q.zenith), format!("{}", q.share), truth, a, b, c]);
     }
-    text += "cover of the ground, and how much more of it the stack hides (± standard error):\n";
-    text += &cover.text();
-    let mut edges = Table::new(0, &["density", "edges", "inside", "step inside", "across", "wrong"]);
-    for s in &r.seams {
+    let mut edges = Table::new(0, &["density", "from edges, m", "meshes", "stack"]);
+    for n in &v.edges {
+        let [from, to] = n.distance;
+        let distance = format!("{from:.1} to {to:.1}");
+        let truth = format!("{:.4}", n.truth);
+        edges.row([format!("{}", n.share), distance, truth, plus(n.difference, n.error)]);
+    }
+    let mut seams = Table::new(0, &["density", "edges", "inside", "step inside", "across", "wrong"]);
+    for s in &v.seams {
         let with = |[mean, error]: [f64; 2]| format!("{mean:.4} ±{error:.4}");
         let [a, b, c] = [s.step_inside, s.step_across, s.step_wrong].map(|v| format!("{v:.4}"));
-        edges.row([format!("{}", s.share), with(s.band), with(s.inside), a, b, c]);
+        seams.row([format!("{}", s.share), with(s.band), with(s.inside), a, b, c]);
     }
-    text += "cover from above along the edges of tiles and inside, and steps from texel to texel:\n";
-    text + &edges.text()
+    format!(
+        "cover of the ground, and how much more of it the stack hides (± standard error):\n{}\
+         from above, by distance from the edges of tiles:\n{}\
+         by texels and slices (on the long way) at half density; all of it with --json:\n{}\
+         cover from above along edges and inside, and steps from texel to texel:\n{}",
+        angles.text(),
+        edges.text(),
+        coarse(v),
+        seams.text()
+    )
+}
+
+/// Stacks of fewer slices and coarser texels: a row a size of texels and angle, a column a number of slices.
+fn coarse(v: &Verified) -> String {
+    let half: Vec<&Coarse> = v.coarse.iter().filter(|c| c.share < 1.0).collect();
+    let mut slices: Vec<u32> = half.iter().map(|c| c.slices).collect();
+    slices.sort_unstable_by(|a, b| b.cmp(a));
+    slices.dedup();
+    let names: Vec<String> = slices.iter().map(|n| format!("{n} slices")).collect();
+    let headings = ["texel, m", "zenith"].into_iter().chain(names.iter().map(String::as_str));
+    let mut table = Table::new(0, &headings.collect::<Vec<_>>());
+    let mut rows: Vec<(f64, f64)> = half.iter().map(|c| (c.texel, c.zenith)).collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    rows.dedup();
+    for row in rows {
+        let of = half.iter().filter(|c| (c.texel, c.zenith) == row);
+        let cells = of.map(|c| format!("{:+.4} ±{:.4}", c.difference, c.error));
+        table.cells([format!("{:.1}", row.0), format!("{:.0}°", row.1)].into_iter().chain(cells).collect());
+    }
+    table.text()
 }

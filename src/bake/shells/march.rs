@@ -38,6 +38,12 @@ impl March {
     pub fn name(self) -> &'static str {
         ["level", "long", "slanted"][self as usize]
     }
+
+    /// Share of a ray that a slice of these covers lets through, at a share of the full density and a cosine of the zenith angle.
+    pub fn long(cover: [f64; SHARES], share: f64, cos: f64) -> f64 {
+        // Weights of texels may add up to more than 1 by rounding.
+        (1.0 - at_share(cover, share)).max(0.0).powf(1.0 / cos)
+    }
 }
 
 /// One mip of one level of shells, laid over the plane.
@@ -74,13 +80,10 @@ impl<'a> Stack<'a> {
         shares: &[f64; N],
     ) -> [[f64; MARCHES]; N] {
         let mut passes = [[1.0; MARCHES]; N];
-        for slice in 0..self.slices {
-            let height = self.height_of(slice);
-            let cover = self.cover(slice, ground + toward.truncate() * (height / toward.z));
+        for cover in self.level(ground, toward) {
             for (p, share) in passes.iter_mut().zip(shares) {
-                let through = 1.0 - at_share(cover, *share);
-                p[March::Level as usize] *= through;
-                p[March::Long as usize] *= through.powf(1.0 / toward.z);
+                p[March::Level as usize] *= 1.0 - at_share(cover, *share);
+                p[March::Long as usize] *= March::long(cover, *share, toward.z);
             }
         }
         self.slanted(ground, toward, |cover| {
@@ -89,6 +92,12 @@ impl<'a> Stack<'a> {
             }
         });
         passes
+    }
+
+    /// Covers where a ray meets level slices, from the ground up.
+    pub fn level(&self, ground: DVec2, toward: DVec3) -> Vec<[f64; SHARES]> {
+        let at = |slice| ground + toward.truncate() * (self.height_of(slice) / toward.z);
+        (0..self.slices).map(|slice| self.cover(slice, at(slice))).collect()
     }
 
     fn height_of(&self, slice: u32) -> f64 {

@@ -8,6 +8,8 @@
 //! comes in low meets as many slices as one from above, where forest would hide more; `verify.rs` has the two ways around that, and measures
 //! them. At a lower density than the full one the mix of species stays, and so do the optics of what is seen.
 
+mod coarse;
+mod edges;
 mod file;
 mod march;
 mod patch;
@@ -22,13 +24,15 @@ use std::path::Path;
 use glam::Vec2;
 use rayon::prelude::*;
 
+pub use coarse::Coarse;
+pub use edges::Near;
 pub use march::{March, Stack, at_share};
 pub use patch::{Image, Patch};
 pub use picture::picture;
 pub use pyramid::{Slices, Texel, VALUES};
-pub use seams::{Seam, seams};
+pub use seams::Seam;
 pub use slices::{Kind, SAMPLES, SHARES, Samples, Seen, Window};
-pub use verify::{Agreement, Quality, verify};
+pub use verify::{Agreement, Quality, Verified, verify};
 
 use super::CacheState;
 use super::optics::{Colours, colours};
@@ -171,11 +175,12 @@ impl Forest {
         [r0, r1, r2, f32::from(u8::from(leaf)), t0, t1, t2, seen.height / slices as f32]
     }
 
-    /// The finest slices of a window of a tile, or of any trees that stand there.
-    pub fn slices(&self, images: &[Image], window: Window) -> Vec<Texel> {
+    /// The finest slices of a window of a tile, or of any trees that stand there, and what they hide from straight above; as [`Slices`] has them.
+    pub fn slices(&self, images: &[Image], window: Window) -> (Vec<Texel>, Vec<[f32; SHARES]>) {
         let samples = Samples::paint(&self.kinds, images, window);
         let value = |seen: &Seen| self.values(&images[seen.tree as usize], seen, window.slices);
-        samples.texels(value).into_iter().map(|(cover, values)| Texel { cover, values }).collect()
+        let texels = samples.texels(value).into_iter().map(|(cover, values)| Texel { cover, values });
+        (texels.collect(), samples.above())
     }
 
     /// The finest slices of a tile. Painted by bands of rows, for no one needs the samples of all rows at once.
@@ -183,16 +188,18 @@ impl Forest {
         let ShellSettings { slices, texels } = settings;
         let texel = self.patch.side as f32 / texels as f32;
         let size = (texels * texels) as usize;
-        let mut all = Slices { side: texels as usize, texels: vec![Texel::default(); size * slices as usize] };
+        let none = vec![Texel::default(); size * slices as usize];
+        let mut all = Slices { side: texels as usize, texels: none, above: Vec::with_capacity(size) };
         for first in (0..texels).step_by(BAND as usize) {
             let low = Vec2::new(0.0, first as f32 * texel);
             let window = Window { low, texel, size: [texels, BAND], slices, height: self.height };
-            let band = self.slices(&self.patch.tiles[kind], window);
+            let (band, above) = self.slices(&self.patch.tiles[kind], window);
             let rows = (BAND * texels) as usize;
             for (slice, from) in band.chunks_exact(rows).enumerate() {
                 let at = slice * size + (first * texels) as usize;
                 all.texels[at..at + rows].copy_from_slice(from);
             }
+            all.above.extend(above);
         }
         all
     }
@@ -205,7 +212,11 @@ impl Shells {
     /// [`Error::Usage`] for settings out of range, and as [`Forest::new`].
     pub fn bake(scene: &Scene, settings: ShellSettings, quiet: bool) -> Result<Self> {
         settings.check()?;
-        let forest = Forest::new(scene)?;
+        Ok(Shells::of(&Forest::new(scene)?, settings, quiet))
+    }
+
+    /// Those of a forest.
+    fn of(forest: &Forest, settings: ShellSettings, quiet: bool) -> Self {
         let progress = Progress::new("baking shells", TILES as u64, quiet);
         let most = forest.most();
         let tiles: Vec<Vec<Vec<Mip>>> = (0..TILES)
@@ -231,7 +242,7 @@ impl Shells {
                 to.passed.extend(&from.passed);
             }
         }
-        Ok(shells)
+        shells
     }
 
     /// The same from the cache in `dir` if it is there, else made and put there.
@@ -257,12 +268,18 @@ impl Shells {
 
 /// Levels and mips of one tile, as bytes.
 fn levels(finest: Slices, most: [[f32; 3]; 2]) -> Vec<Vec<Mip>> {
-    let size = |s: &Slices| s.side * s.side;
-    let merged = |s: &Slices| (s.texels.len() > size(s)).then(|| s.merged());
     let halved = |s: &Slices| (s.side > 1).then(|| s.halved());
-    std::iter::successors(Some(finest), merged)
-        .map(|level| std::iter::successors(Some(level), halved).map(|mip| quantised(&mip, most)).collect())
-        .collect()
+    let merged = |s: &Slices| (s.texels.len() > s.above.len()).then(|| s.merged());
+    let mut levels: Vec<Vec<Mip>> = Vec::new();
+    for mip in std::iter::successors(Some(finest), halved) {
+        for (level, slices) in std::iter::successors(Some(mip.fitted()), merged).enumerate() {
+            if levels.len() == level {
+                levels.push(Vec::new());
+            }
+            levels[level].push(quantised(&slices, most));
+        }
+    }
+    levels
 }
 
 /// Slices as bytes.
@@ -286,3 +303,6 @@ fn empty(settings: ShellSettings) -> Vec<Vec<Mip>> {
     let mips = || (0..=settings.texels.ilog2()).map(|m| Mip { side: settings.texels >> m, ..Mip::default() });
     (0..=settings.slices.ilog2()).map(|_| mips().collect()).collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -4,14 +4,23 @@
 //! before and which while drawing. Cover is kept at four shares of the full density, each merged by itself; a mean activation
 //! threshold would make a texel of a mip, in which many trees are, appear all at once.
 //!
-//! Mips are means of the texels of one tile. They mix no tiles, so a tile's mean cover is the same in every mip, whichever its neighbours
-//! are, down to one texel a tile. A filter that reaches over an edge takes the texels of the tile that lies there (`verify.rs` does), or stays in
-//! its own tile (clamps); no gutter could hold them, for eight tiles fit an edge.
+//! **Cover is kept.** "Over" takes what two slices hide of a texel for independent, and it is not: a crown's slices hide the same part of a texel at
+//! its rim, and in a mip all slices hide the same places, those under trees. Stacks of means would hide far too much. What a stack as a whole
+//! hides from straight above is known, though, from the samples; so in each texel of each mip the slices' optical depths −ln(1 − α) are
+//! multiplied by the one factor that makes the stack hide just that ([`Slices::fitted`]), before slices are merged. All levels of a mip then
+//! have the same cover from above, and all mips have it in the mean. Optics go with cover.
+//!
+//! Mips are means of the texels of one tile, down to one texel a tile. They mix no tiles, so a tile's cover is the same whichever its neighbours
+//! are. A filter that reaches over an edge takes the texels of the tile that lies there (`march.rs` does), or stays in its own tile (clamps);
+//! no gutter could hold them, for eight tiles fit an edge.
 
 use super::slices::SHARES;
 
 /// Values of a texel beside cover: reflectance (3), leaf share, transmittance (3), height.
 pub const VALUES: usize = 8;
+
+/// Least share of a texel that a stack lets through: an infinite depth could not be shared out among slices.
+const CLEAR: f32 = 1e-4;
 
 /// A texel of a slice, all of it premultiplied by cover.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,6 +49,8 @@ pub struct Slices {
     pub side: usize,
     /// The texels.
     pub texels: Vec<Texel>,
+    /// What all slices together hide of each texel's ground from straight above, at each of the shares of the density.
+    pub above: Vec<[f32; SHARES]>,
 }
 
 impl Slices {
@@ -51,7 +62,31 @@ impl Slices {
             let (low, high) = pair.split_at(size);
             high.iter().zip(low).map(|(h, l)| h.over(l)).collect::<Vec<_>>()
         };
-        Slices { side: self.side, texels: pairs.flat_map(merge).collect() }
+        Slices { side: self.side, texels: pairs.flat_map(merge).collect(), above: self.above.clone() }
+    }
+
+    /// The same with covers that hide together what the stack hides from straight above.
+    pub fn fitted(mut self) -> Slices {
+        let size = self.side * self.side;
+        for (k, above) in self.above.iter().enumerate() {
+            for share in 0..SHARES {
+                let depths = self.texels[k..].iter().step_by(size).map(|t| -(1.0 - t.cover[share]).ln());
+                let factor = -(1.0 - above[share]).max(CLEAR).ln() / depths.sum::<f32>();
+                // Nothing is there, or a slice is opaque: then the stack is, too.
+                if !(factor.is_finite() && factor > 0.0) {
+                    continue;
+                }
+                for t in self.texels[k..].iter_mut().step_by(size) {
+                    let cover = 1.0 - (1.0 - t.cover[share]).powf(factor);
+                    if share == SHARES - 1 && t.cover[share] > 0.0 {
+                        let ratio = cover / t.cover[share];
+                        t.values.iter_mut().for_each(|v| *v *= ratio);
+                    }
+                    t.cover[share] = cover;
+                }
+            }
+        }
+        self
     }
 
     /// The next mip: means of two by two texels of each slice.
@@ -68,6 +103,10 @@ impl Slices {
                 texels.push(mean([slice[k], slice[k + 1], slice[k + self.side], slice[k + self.side + 1]]));
             }
         }
-        Slices { side, texels }
+        let above = (0..side * side).map(|k| 2 * (k / side * self.side + k % side)).map(|k| {
+            let of = [k, k + 1, k + self.side, k + self.side + 1];
+            std::array::from_fn(|share| 0.25 * of.iter().map(|k| self.above[*k][share]).sum::<f32>())
+        });
+        Slices { side, texels, above: above.collect() }
     }
 }

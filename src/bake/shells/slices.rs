@@ -12,6 +12,8 @@ use crate::Result;
 pub const SAMPLES: u32 = 4;
 /// Shares of the full density at which cover is known: 1/4, 2/4, 3/4, 4/4.
 pub const SHARES: usize = 4;
+/// By so much of its size a triangle is wider than it is.
+const EDGE: f32 = 1e-5;
 /// Where a sample sees no tree.
 pub const NONE: u32 = u32::MAX;
 
@@ -114,7 +116,8 @@ impl Samples {
         }
     }
 
-    /// One triangle, its corners in samples and slabs. A sample whose middle is on an edge belongs to both sides: the higher one is seen.
+    /// One triangle, its corners in samples and slabs. A sample whose middle is on an edge belongs to both sides: the higher one is seen, and
+    /// rounding leaves no gap between them.
     fn paint_face(&mut self, surface: &Surface, face: u32, p: [Vec3; 3], (tree, class): (u32, u8)) {
         let [columns, rows] = self.window.size.map(|n| (n * SAMPLES) as f32);
         let (low, high) = (p[0].min(p[1]).min(p[2]), p[0].max(p[1]).max(p[2]));
@@ -133,7 +136,7 @@ impl Samples {
             for x in first[0] as u32..=last[0] as u32 {
                 let q = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) - a;
                 let (w1, w2) = (step1.dot(q), step2.dot(q));
-                if w1 < 0.0 || w2 < 0.0 || w1 + w2 > 1.0 {
+                if w1 < -EDGE || w2 < -EDGE || w1 + w2 > 1.0 + EDGE {
                     continue;
                 }
                 let w0 = 1.0 - w1 - w2;
@@ -155,6 +158,21 @@ impl Samples {
                 }
             }
         }
+    }
+
+    /// Share of the ground of each texel that is hidden from straight above at each of the [`SHARES`]; by row from the south, and column.
+    pub fn above(&self) -> Vec<[f32; SHARES]> {
+        let [columns, rows] = self.window.size;
+        let plane = (columns * rows * SAMPLES * SAMPLES) as usize;
+        let part = 1.0 / (SAMPLES * SAMPLES) as f32;
+        let mut above = vec![[0.0; SHARES]; (columns * rows) as usize];
+        for k in 0..plane {
+            let least = self.least[k..].iter().step_by(plane).min().map_or(SHARES, |l| usize::from(*l));
+            let (x, y) = (k as u32 % (columns * SAMPLES), k as u32 / (columns * SAMPLES));
+            let cover = &mut above[(y / SAMPLES * columns + x / SAMPLES) as usize];
+            cover[least..].iter_mut().for_each(|c| *c += part);
+        }
+        above
     }
 
     fn index(&self, height: f32, x: u32, y: u32) -> usize {

@@ -1,27 +1,33 @@
 //! How well a stack of slices hides the ground: against rays cast at the same trees, direction by direction, at the full density and at half
-//! of it; and whether one can tell where tiles meet (`seams.rs`).
+//! of it; near the edges of tiles (`edges.rs`), in coarse texels (`coarse.rs`), and whether one can tell where tiles meet (`seams.rs`).
 
+use std::f64::consts::TAU;
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 
+use super::coarse::{Coarse, coarse};
+use super::edges::{Near, edges};
 use super::march::{MARCHES, March, Stack};
+use super::seams::{Seam, seams};
+use super::slices::SHARES;
 use super::{Forest, Patch, Shells};
 use crate::Result;
 use crate::bake::foliage::Foliage;
 use crate::bake::grove::{Grove, Tree};
 use crate::land::candidate::tile_kind;
-use crate::physics::hash::Stream;
+use crate::physics::hash::{Stream, hash2};
 use crate::rays;
 use crate::scene::Scene;
 
 /// Tiles a side of the ground that rays start from.
-const BLOCK: i32 = 4;
+pub(super) const BLOCK: i32 = 4;
 /// The lowest view, degrees from the zenith.
 const LOWEST: f64 = 80.0;
 /// Shares of the full density that are looked at.
-const DENSITIES: [f64; 2] = [1.0, 0.5];
+pub(super) const DENSITIES: [f64; 2] = [1.0, 0.5];
 
 /// Cover of the ground as a stack has it.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -51,50 +57,91 @@ pub struct Quality {
     pub stack: [Agreement; MARCHES],
 }
 
-/// Looks at the ground from so many angles between the zenith and 80 degrees, at so many points each, at full and half density.
+/// What [`verify`] finds.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Verified {
+    /// Cover of the ground by angle, at full and half density.
+    pub angles: Vec<Quality>,
+    /// Cover from above by distance from the edges of tiles.
+    pub edges: Vec<Near>,
+    /// Cover by merged slices and mips.
+    pub coarse: Vec<Coarse>,
+    /// Tiles side by side, at each share of the full density.
+    pub seams: [Seam; SHARES],
+}
+
+/// Holds shells against the trees that they were made of: by rays from so many angles between the zenith and 80 degrees, at so many points
+/// each; from above at four times as many, by distance from edges; and tiles against one another.
 ///
 /// # Errors
 /// As [`Forest::new`].
-pub fn verify(scene: &Scene, shells: &Shells, directions: u32, points: u32) -> Result<Vec<Quality>> {
+pub fn verify(scene: &Scene, shells: &Shells, directions: u32, points: u32) -> Result<Verified> {
     let forest = Forest::new(scene)?;
-    let stack = Stack::new(shells, scene.seed, 0, 0);
-    let foliage = scene.species.iter().map(|s| Foliage::new(&s.mesh, &s.optics).map(Arc::new));
-    let foliage = foliage.collect::<Result<Vec<_>>>()?;
     // As far as a ray at the lowest view goes before it leaves the highest tree.
     let margin = (f64::from(shells.height) * LOWEST.to_radians().tan() / shells.tile_side).ceil() as i32 + 1;
-    let groves = DENSITIES.map(|share| {
-        let trees = standing(&forest.patch, scene.seed, -margin..BLOCK + margin, share);
-        Grove::new(foliage.clone(), trees)
-    });
+    let truth = Truth::new(scene, &forest, -margin..BLOCK + margin)?;
+    Ok(Verified {
+        angles: angles(scene, shells, &truth, (directions, points)),
+        coarse: coarse(scene, shells, &truth, points),
+        edges: edges(scene, shells, &forest, 4 * points)?,
+        seams: seams(shells),
+    })
+}
+
+/// Cover by angle.
+fn angles(
+    scene: &Scene,
+    shells: &Shells,
+    truth: &Truth,
+    (directions, points): (u32, u32),
+) -> Vec<Quality> {
+    let stack = Stack::new(shells, scene.seed, 0, 0);
+    let side = f64::from(BLOCK) * shells.tile_side;
     let mut found = Vec::new();
     for k in 0..directions {
         let zenith = LOWEST * f64::from(k) / f64::from((directions - 1).max(1));
+        let (sin, cos) = zenith.to_radians().sin_cos();
         let seen: Vec<[Outcome; 2]> = (0..points)
             .into_par_iter()
             .map_init(rays::Stack::new, |open, ray| {
-                let mut stream = Stream::new(crate::physics::hash::hash2(k, ray));
-                let side = f64::from(BLOCK) * shells.tile_side;
+                let mut stream = Stream::new(hash2(k, ray));
                 let ground = DVec2::new(side * stream.unit(), side * stream.unit());
-                let azimuth = std::f64::consts::TAU * stream.unit();
-                let (sin, cos) = zenith.to_radians().sin_cos();
-                let toward = (DVec2::from_angle(azimuth) * sin).extend(cos);
+                let toward = (DVec2::from_angle(TAU * stream.unit()) * sin).extend(cos);
                 let passes = stack.passes(ground, toward, &DENSITIES);
-                let origin = ground.as_vec2().extend(0.0);
-                [0, 1].map(|d| Outcome {
-                    hidden: f64::from(u8::from(groves[d].occluded(origin, toward.as_vec3(), open))),
-                    cover: passes[d].map(|p| 1.0 - p),
-                })
+                let hidden = truth.hidden(ground, toward.as_vec3(), open);
+                [0, 1].map(|d| Outcome { hidden: hidden[d], cover: passes[d].map(|p| 1.0 - p) })
             })
             .collect();
         for (d, share) in DENSITIES.into_iter().enumerate() {
             found.push(quality(zenith, share, seen.iter().map(|s| s[d])));
         }
     }
-    Ok(found)
+    found
+}
+
+/// The meshes of a square of tiles, by density.
+pub(super) struct Truth {
+    groves: [Grove; 2],
+}
+
+impl Truth {
+    /// Of these tiles east and north; their origin is the south-west corner of tile 0, 0.
+    pub fn new(scene: &Scene, forest: &Forest, tiles: Range<i32>) -> Result<Self> {
+        let foliage = scene.species.iter().map(|s| Foliage::new(&s.mesh, &s.optics).map(Arc::new));
+        let foliage = foliage.collect::<Result<Vec<_>>>()?;
+        let of = |share| Grove::new(foliage.clone(), standing(&forest.patch, scene.seed, tiles.clone(), share));
+        Ok(Truth { groves: DENSITIES.map(of) })
+    }
+
+    /// 1 where a place on the ground is hidden from a viewer in this direction, else 0.
+    pub fn hidden(&self, ground: DVec2, toward: Vec3, open: &mut rays::Stack) -> [f64; 2] {
+        let origin = ground.as_vec2().extend(0.0);
+        [0, 1].map(|d| f64::from(u8::from(self.groves[d].occluded(origin, toward, open))))
+    }
 }
 
 /// The trees of a square of tiles that stand at a share of the full density, with the origin at the south-west corner of tile 0, 0.
-fn standing(patch: &Patch, seed: u32, tiles: std::ops::Range<i32>, share: f64) -> Vec<Tree> {
+fn standing(patch: &Patch, seed: u32, tiles: Range<i32>, share: f64) -> Vec<Tree> {
     let mut trees = Vec::new();
     for (x, y) in tiles.clone().flat_map(|y| tiles.clone().map(move |x| (x, y))) {
         let corner = Vec3::new(x as f32, y as f32, 0.0) * patch.side as f32;
