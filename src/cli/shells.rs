@@ -134,7 +134,7 @@ fn verified(v: &Verified) -> String {
         let truth = format!("{:.4} ±{:.4}", q.truth, q.error);
         angles.row([format!("{:.0}°", q.zenith), format!("{}", q.share), truth, a, b, c]);
     }
-    let mut edges = Table::new(0, &["density", "from edges, m", "meshes", "stack"]);
+    let mut edges = Table::new(0, &["density", "from edges, m", "meshes", "one slice"]);
     for n in &v.edges {
         let [from, to] = n.distance;
         let distance = format!("{from:.1} to {to:.1}");

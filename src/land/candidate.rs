@@ -125,8 +125,13 @@ impl Layout {
 /// Which of the sixteen tiles lies at a place of the plane, counted in tiles east and north: the colours of its edges come from a hash of
 /// the edge.
 pub fn tile_kind(seed: u32, x: i32, y: i32) -> usize {
-    let edge = |x: i32, y: i32, axis: u32| hash2(seed.wrapping_add(axis), hash2(x as u32, y as u32)) & 1;
-    (edge(x, y, 1) | edge(x, y + 1, 1) << 1 | edge(x, y, 2) << 2 | edge(x + 1, y, 2) << 3) as usize
+    let colour = |x: i32, y: i32, axis: u32| hash2(seed.wrapping_add(axis), hash2(x as u32, y as u32)) & 1;
+    kind_of(x, y, |x, y, axis| colour(x, y, axis) as usize)
+}
+
+/// The tile at a place, by the colours (0 or 1) of the edges south (axis 1) and west (axis 2) of each place.
+pub fn kind_of(x: i32, y: i32, colour: impl Fn(i32, i32, u32) -> usize) -> usize {
+    colour(x, y, 1) | colour(x, y + 1, 1) << 1 | colour(x, y, 2) << 2 | colour(x + 1, y, 2) << 3
 }
 
 /// The tree of a species' list; its position is from the terrain's south-west corner.

@@ -1,11 +1,12 @@
 //! Cover from straight above by distance from the edges of tiles, against rays cast at the same trees: whether what becomes of crowns that reach
-//! over an edge leaves as much cover there as elsewhere.
+//! over an edge leaves as much cover there as meshes have. Of the stack as one slice, which from above is a picture of what is hidden: layers and
+//! filters add nothing to its mean.
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::march::{March, Stack};
-use super::verify::{DENSITIES, Truth, mean};
+use super::verify::{Truth, mean};
 use super::{Forest, Shells};
 use crate::land::candidate::tile_kind;
 use crate::land::pattern::TILES;
@@ -19,6 +20,9 @@ const BLOCK: i32 = 24;
 /// Distances from the nearest edge up to which cover is told apart, in tile sides.
 const DISTANCES: [f64; 4] = [1.0 / 32.0, 1.0 / 16.0, 1.0 / 8.0, 0.5];
 
+/// Shares of the full density that are looked at: where trees are few, those that are missing show.
+const SHARES: [f64; 2] = [0.5, 0.25];
+
 /// Cover at some distance from the edges of tiles.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Near {
@@ -28,7 +32,7 @@ pub struct Near {
     pub distance: [f64; 2],
     /// Share of the ground that meshes hide, no crown of which ends at an edge.
     pub truth: f64,
-    /// What the finest stack hides, less that.
+    /// What the stack merged to one slice hides, less that.
     pub difference: f64,
     /// Standard error of the difference, from the spread of the four sides of sixteen tiles.
     pub error: f64,
@@ -42,7 +46,7 @@ struct Point {
     distance: f64,
     /// 1 where meshes hide it, by density.
     hidden: [f64; 2],
-    /// What the stack hides, by density.
+    /// What the slice hides, by density.
     cover: [f64; 2],
 }
 
@@ -51,8 +55,8 @@ struct Point {
 /// # Errors
 /// Those of [`Forest::new`].
 pub fn edges(scene: &Scene, shells: &Shells, forest: &Forest, points: u32) -> Result<Vec<Near>> {
-    let truth = Truth::new(scene, forest, -1..BLOCK + 1)?;
-    let stack = Stack::new(shells, scene.seed, 0, 0);
+    let truth = Truth::new(scene, forest, -1..BLOCK + 1, SHARES)?;
+    let one = Stack::new(shells, scene.seed, shells.levels.len() - 1, 0);
     let seen: Vec<Point> = (0..points)
         .into_par_iter()
         .map_init(rays::Stack::new, |open, k| {
@@ -68,7 +72,7 @@ pub fn edges(scene: &Scene, shells: &Shells, forest: &Forest, points: u32) -> Re
                 side: 4 * kind + nearest,
                 distance: to_edges[nearest],
                 hidden: truth.hidden(ground, Vec3::Z, open),
-                cover: stack.passes(ground, DVec3::Z, &DENSITIES).map(|p| 1.0 - p[March::Level as usize]),
+                cover: one.passes(ground, DVec3::Z, &SHARES).map(|p| 1.0 - p[March::Level as usize]),
             }
         })
         .collect();
@@ -78,7 +82,7 @@ pub fn edges(scene: &Scene, shells: &Shells, forest: &Forest, points: u32) -> Re
 /// By distance from edges.
 fn near(seen: &[Point], tile_side: f64) -> Vec<Near> {
     let mut found = Vec::new();
-    for (d, share) in DENSITIES.into_iter().enumerate() {
+    for (d, share) in SHARES.into_iter().enumerate() {
         let mut from = 0.0;
         for to in DISTANCES {
             let here = || seen.iter().filter(move |p| (from..to).contains(&p.distance));

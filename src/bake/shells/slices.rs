@@ -110,7 +110,7 @@ impl Samples {
         for (face, corners) in (0u32..).zip(&kind.corners) {
             let corners = corners.map(|p| {
                 let p = image.tree.to_grove(p);
-                (base + image.flip * p.truncate() * across).extend(p.z * up)
+                (base + p.truncate() * across).extend(p.z * up)
             });
             self.paint_face(&kind.surface, face, corners, (tree, class));
         }

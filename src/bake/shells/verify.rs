@@ -62,7 +62,7 @@ pub struct Quality {
 pub struct Verified {
     /// Cover of the ground by angle, at full and half density.
     pub angles: Vec<Quality>,
-    /// Cover from above by distance from the edges of tiles.
+    /// Cover from above by distance from the edges of tiles, at half and a quarter of the density.
     pub edges: Vec<Near>,
     /// Cover by merged slices and mips.
     pub coarse: Vec<Coarse>,
@@ -79,7 +79,7 @@ pub fn verify(scene: &Scene, shells: &Shells, directions: u32, points: u32) -> R
     let forest = Forest::new(scene)?;
     // As far as a ray at the lowest view goes before it leaves the highest tree.
     let margin = (f64::from(shells.height) * LOWEST.to_radians().tan() / shells.tile_side).ceil() as i32 + 1;
-    let truth = Truth::new(scene, &forest, -margin..BLOCK + margin)?;
+    let truth = Truth::new(scene, &forest, -margin..BLOCK + margin, DENSITIES)?;
     Ok(Verified {
         angles: angles(scene, shells, &truth, (directions, points)),
         coarse: coarse(scene, shells, &truth, points),
@@ -125,12 +125,12 @@ pub(super) struct Truth {
 }
 
 impl Truth {
-    /// Of these tiles east and north; their origin is the south-west corner of tile 0, 0.
-    pub fn new(scene: &Scene, forest: &Forest, tiles: Range<i32>) -> Result<Self> {
+    /// Of these tiles east and north, at two shares of the full density; their origin is the south-west corner of tile 0, 0.
+    pub fn new(scene: &Scene, forest: &Forest, tiles: Range<i32>, shares: [f64; 2]) -> Result<Self> {
         let foliage = scene.species.iter().map(|s| Foliage::new(&s.mesh, &s.optics).map(Arc::new));
         let foliage = foliage.collect::<Result<Vec<_>>>()?;
         let of = |share| Grove::new(foliage.clone(), standing(&forest.patch, scene.seed, tiles.clone(), share));
-        Ok(Truth { groves: DENSITIES.map(of) })
+        Ok(Truth { groves: shares.map(of) })
     }
 
     /// 1 where a place on the ground is hidden from a viewer in this direction, else 0.
