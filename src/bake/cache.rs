@@ -7,6 +7,7 @@
 //!   models, their reflectances and densities, and the ground.
 //! - `.levels`, coarser meshes ([`super::levels`]): of the model.
 //! - `.envelopes`, the crown around each leaf ([`super::envelope`]): of the model and of the number of directions.
+//! - `.shells`, forest far away as slices ([`super::shells`]): of a forest's models, reflectances, scales, densities and point pattern.
 //! - `.forest`, the tables of far forests ([`super::tables`]): of both.
 
 use std::path::{Path, PathBuf};

@@ -8,12 +8,12 @@ use rayon::prelude::*;
 use super::march::{March, Stack};
 use super::verify::{Truth, mean};
 use super::{Forest, Shells};
+use crate::Result;
 use crate::land::candidate::tile_kind;
 use crate::land::pattern::TILES;
 use crate::physics::hash::Stream;
 use crate::rays;
 use crate::scene::Scene;
-use crate::Result;
 
 /// Tiles a side of the ground that is looked at: enough that most tiles have had most neighbours.
 const BLOCK: i32 = 24;

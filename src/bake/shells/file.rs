@@ -46,8 +46,14 @@ fn sizes(settings: ShellSettings) -> Vec<usize> {
 /// BLAKE3 of everything that they depend on: the pattern, models, reflectances, scales and densities.
 fn key(scene: &Scene, settings: ShellSettings) -> [u8; 32] {
     let mut fields = Fields::new("canopy shells");
-    let numbers =
-        [FORMAT.version, settings.slices, settings.texels, slices::SAMPLES, slices::SHARES as u32, scene.seed];
+    let numbers = [
+        FORMAT.version,
+        settings.slices,
+        settings.texels,
+        slices::SAMPLES,
+        slices::SHARES as u32,
+        scene.seed,
+    ];
     fields.put(&numbers.map(u32::to_le_bytes).concat());
     for s in &scene.species {
         // A species that is only listed has no trees in shells, but its place among the others.

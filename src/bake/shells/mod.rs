@@ -153,8 +153,7 @@ impl Forest {
             let most = each.fold([1e-6f32; 3], |a, b| std::array::from_fn(|i| a[i].max(b[i])));
             most.map(|m| (TINT * m).min(1.0))
         };
-        let reflected =
-            |c: &Colours| std::array::from_fn(|i| c.reflectance[i].max(c.bark_reflectance[i]));
+        let reflected = |c: &Colours| std::array::from_fn(|i| c.reflectance[i].max(c.bark_reflectance[i]));
         [of(&reflected), of(&|c| c.transmittance)]
     }
 

@@ -136,7 +136,9 @@ fn neighbours(seed: u32, kind: usize) -> Vec<(Vec3, usize)> {
     let own = [(0, 0, 1), (0, 1, 1), (0, 0, 2), (1, 0, 2)];
     let colour = |x: i32, y: i32, axis: u32| match own.iter().position(|e| *e == (x, y, axis)) {
         Some(edge) => kind >> edge & 1,
-        None => (hash2(hash2(seed ^ SHELL, kind as u32), hash2(axis, hash2(x as u32, y as u32))) & 1) as usize,
+        None => {
+            (hash2(hash2(seed ^ SHELL, kind as u32), hash2(axis, hash2(x as u32, y as u32))) & 1) as usize
+        }
     };
     let around = (-1..=1).flat_map(|y| (-1..=1).map(move |x| (x, y))).filter(|step| *step != (0, 0));
     around.map(|(x, y)| (Vec3::new(x as f32, y as f32, 0.0), kind_of(x, y, colour))).collect()

@@ -68,10 +68,10 @@ impl Slices {
     /// The same with covers that hide together what the stack hides from straight above.
     pub fn fitted(mut self) -> Slices {
         let size = self.side * self.side;
-        for (k, above) in self.above.iter().enumerate() {
-            for share in 0..SHARES {
+        for (k, shares) in self.above.iter().enumerate() {
+            for (share, above) in shares.iter().enumerate() {
                 let depths = self.texels[k..].iter().step_by(size).map(|t| -(1.0 - t.cover[share]).ln());
-                let factor = -(1.0 - above[share]).max(CLEAR).ln() / depths.sum::<f32>();
+                let factor = -(1.0 - above).max(CLEAR).ln() / depths.sum::<f32>();
                 // Nothing is there, or a slice is opaque: then the stack is, too.
                 if !(factor.is_finite() && factor > 0.0) {
                     continue;

@@ -110,7 +110,8 @@ impl<'a> Tiles<'a> {
                 for (a, b) in (0..TILES).flat_map(|a| (0..TILES).map(move |b| (a, b))) {
                     // b lies before a's edge.
                     let fits = (a >> edge ^ b >> (edge + 1)) & 1 == 0;
-                    let steps = [self.along(a, slice, edge, place, 0), self.along(b, slice, edge + 1, place, 0)];
+                    let steps =
+                        [self.along(a, slice, edge, place, 0), self.along(b, slice, edge + 1, place, 0)];
                     add(if fits { 1 } else { 2 }, steps[0], steps[1]);
                 }
                 for t in 0..TILES {

@@ -4,9 +4,9 @@
 use glam::{Vec2, Vec3};
 
 use super::patch::Image;
+use crate::Result;
 use crate::bake::surface::{Face, Surface};
 use crate::scene::Mesh;
-use crate::Result;
 
 /// Samples a side of a texel: 16 a texel.
 pub const SAMPLES: u32 = 4;
@@ -89,8 +89,7 @@ impl Samples {
     pub fn paint(kinds: &[Kind], images: &[Image], window: Window) -> Self {
         let count = (window.size[0] * window.size[1] * SAMPLES * SAMPLES * window.slices) as usize;
         let nothing = Seen { height: f32::NEG_INFINITY, tree: NONE, face: NONE };
-        let mut samples =
-            Samples { window, seen: vec![nothing; count], least: vec![SHARES as u8; count] };
+        let mut samples = Samples { window, seen: vec![nothing; count], least: vec![SHARES as u8; count] };
         let extent = Vec2::new(window.size[0] as f32, window.size[1] as f32) * window.texel;
         for (index, image) in (0u32..).zip(images) {
             let kind = &kinds[image.tree.species as usize];
@@ -183,7 +182,10 @@ impl Samples {
 
     /// Share of each texel that is covered at each of the [`SHARES`], and the mean over the texel of what `value` says of the surfaces that are
     /// seen there at full density, 0 where there is none: both are premultiplied. By slab, row from the south, and column.
-    pub fn texels<const N: usize>(&self, value: impl Fn(&Seen) -> [f32; N]) -> Vec<([f32; SHARES], [f32; N])> {
+    pub fn texels<const N: usize>(
+        &self,
+        value: impl Fn(&Seen) -> [f32; N],
+    ) -> Vec<([f32; SHARES], [f32; N])> {
         let [columns, rows] = self.window.size;
         let part = 1.0 / (SAMPLES * SAMPLES) as f32;
         let mut texels = vec![([0.0; SHARES], [0.0; N]); (columns * rows * self.window.slices) as usize];

@@ -89,12 +89,7 @@ pub fn verify(scene: &Scene, shells: &Shells, directions: u32, points: u32) -> R
 }
 
 /// Cover by angle.
-fn angles(
-    scene: &Scene,
-    shells: &Shells,
-    truth: &Truth,
-    (directions, points): (u32, u32),
-) -> Vec<Quality> {
+fn angles(scene: &Scene, shells: &Shells, truth: &Truth, (directions, points): (u32, u32)) -> Vec<Quality> {
     let stack = Stack::new(shells, scene.seed, 0, 0);
     let side = f64::from(BLOCK) * shells.tile_side;
     let mut found = Vec::new();
@@ -129,7 +124,8 @@ impl Truth {
     pub fn new(scene: &Scene, forest: &Forest, tiles: Range<i32>, shares: [f64; 2]) -> Result<Self> {
         let foliage = scene.species.iter().map(|s| Foliage::new(&s.mesh, &s.optics).map(Arc::new));
         let foliage = foliage.collect::<Result<Vec<_>>>()?;
-        let of = |share| Grove::new(foliage.clone(), standing(&forest.patch, scene.seed, tiles.clone(), share));
+        let of =
+            |share| Grove::new(foliage.clone(), standing(&forest.patch, scene.seed, tiles.clone(), share));
         Ok(Truth { groves: shares.map(of) })
     }
 
