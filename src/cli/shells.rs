@@ -22,10 +22,10 @@ Examples:
 pub struct Args {
     /// Scene file (TOML); left out: the built-in scene
     scene: Option<PathBuf>,
-    /// Slices of the finest stack, from the ground to the top of the tallest tree: a power of two, 2 to 64
+    /// Slices of the finest stack, from the ground to the top of the tallest tree: a power of two, 2 to 32
     #[arg(long, value_name = "N", default_value_t = ShellSettings::default().slices)]
     slices: u32,
-    /// Texels a side of a tile: a power of two, 16 to 512
+    /// Texels a side of a tile: a power of two, 16 to 256
     #[arg(long, value_name = "N", default_value_t = ShellSettings::default().texels)]
     texels: u32,
     /// Compare cover of the ground with rays cast at the same trees, from N angles between the zenith and 80 degrees, and look for

@@ -49,9 +49,9 @@ const TINT: f32 = 1.15;
 /// What is asked of shells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShellSettings {
-    /// Slices of the finest stack: a power of two, 2 to 64.
+    /// Slices of the finest stack: a power of two, 2 to 32.
     pub slices: u32,
-    /// Texels a side of a tile: a power of two, 16 to 512.
+    /// Texels a side of a tile: a power of two, 16 to 256.
     pub texels: u32,
 }
 
@@ -64,11 +64,12 @@ impl Default for ShellSettings {
 impl ShellSettings {
     fn check(self) -> Result<()> {
         let fits = |n: u32, low: u32, high: u32| n.is_power_of_two() && (low..=high).contains(&n);
-        if fits(self.slices, 2, 64) && fits(self.texels, 16, 512) {
+        // The most of both are a gibibyte.
+        if fits(self.slices, 2, 32) && fits(self.texels, 16, 256) {
             return Ok(());
         }
         Err(Error::Usage(format!(
-            "cannot make shells of {} slices of {} texels: powers of two, 2 to 64 slices and 16 to 512 texels",
+            "cannot make shells of {} slices of {} texels: powers of two, 2 to 32 slices and 16 to 256 texels",
             self.slices, self.texels
         )))
     }

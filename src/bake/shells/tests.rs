@@ -342,6 +342,9 @@ fn what_no_shells_can_be_made_of_is_said() {
     };
     let thin = pines("density = 0.01");
     assert!(said(&thin, 12, 64).contains("powers of two") && said(&thin, 16, 8).contains("powers of two"));
+    assert!(
+        said(&thin, 64, 64).contains("2 to 32 slices") && said(&thin, 16, 512).contains("16 to 256 texels")
+    );
     assert!(said(&pines("density = 5.0"), 16, 64).contains("do not fit into a tile"));
     let mut listed = pines("density = 0.01");
     listed.species[0].distribution = crate::scene::Distribution::Positions(Vec::new().into());
