@@ -27,6 +27,13 @@ const uint MESH_TRIANGLES = 524288u;  // most triangles of a mesh: 19 bits of it
 const uint HIDING_STEPS = 16u;        // steps of height above the ground for which what trees hide of the sky is known
 const uint TREE_SPECIES = 15u;        // of a tree's word of species: its index; the rest is its sway in the wind (physics/wind.glsl), in its own axes
 const uint MESH_SEEN = 0x80000000u;   // of what a sample sees: a mesh's tree << 19 | triangle, not a quad of the ground
+const uint CARD_SEEN = 0x40000000u;   // of what a sample sees, where it is no mesh: a tree << 9 | card of its cloud
+const uint CARD_TREES = 2097152u;     // most trees in view, where some are clouds of cards: 21 bits of it
+const uint MOST_CARDS = 512u;         // most cards of a cloud with its far form: 9 bits of it
+const uint FAR_CARDS = 3u;            // cards of the far form of a cloud
+const uint CARD_LEVELS = 4u;          // levels of detail of pictures of cards
+const uint SKY_STEPS = 16u;           // steps of the height, and of the thickness of crowns around, for which the sky of a forest is known
+const float TRANSFER_SCALE = 1.024;    // of coefficients of light transfer as they are stored, -1 to 1
 const uint LEAF_OCTAVES = 7u;         // shares of the leaves at which the pull on their cards is known: 1, 1/2, 1/4 and so on
 const float LEAST_SHARE = 0.015625;   // the last of them
 const float FADE_BAND = 0.1;          // half the width of the band of ranks in which cards fade, over u (1 - u)
@@ -111,6 +118,7 @@ struct Species {
     float turning;                    // change of the reflectance with the phase angle, 1/rad
     float sky_path;                   // mean optical path of the sky's light through single crowns, a unit of thickness
     float hole;                       // 1 / squared radius of the hole around a tree, over the density: BN12 eq. 9
+    float card_range;                 // distance to which trees are clouds of cards at most, times their scale, m; 0: none is
     vec4 lit[4];                      // correction of the share of a crown that is lit: two at the middle of the tree, two of their change
     vec4 sent[4];                     // correction of the sunlight that it sends
 };
@@ -191,7 +199,7 @@ struct Tree {
     vec3 sun;                         // radiance of a lit leaf at height 0: phase function, hotspot, irradiance and correction
     uint hole_change;                 // halves: 1 / squared radius of the hole around it, 1/m2; change of `sun` with the height, over it
     vec3 sky;                         // radiance of a leaf under the whole sky
-    uint cascade_tint;                // cascade for its shadow lookups | samples in which it is its mesh << 8 | tint as a half << 16
+    uint cascade_tint;                // cascade for its shadow lookups | samples in which it is its mesh << 8 | its mesh or its cards << 12 | tint as a half << 16
     vec3 mean_sun;                    // average radiance from the sun, times nu of BN12 eq. 22
     uint own_lit;                     // halves: 1 - nu, weight of the tree's own light; correction of its lit share at height 0
     vec3 mean_sky;                    // average radiance from the sky, times nu
@@ -265,6 +273,43 @@ struct MeshParameters {
     uint species_count;               // of the scene
     float leaf_pixels;                // least side of a card on the screen; 0: meshes are always whole
     uint named;                       // 1: draws name their trees; 0: whoever records them does
+};
+
+// A card of a cloud, m from the middle of the tree's box, and its pictures in the atlas of its species.
+struct Card {
+    vec3 centre;                      // its middle
+    float depth;                      // half depth of what is painted on it, m
+    vec3 right;                       // from there to the middle of its right edge
+    uint front;                       // upper left texel of the picture of its front: x | y << 16
+    vec3 up;                          // and of its upper edge
+    uint back;                        // the same of its back
+    uint size;                        // of either picture, texels: width | height << 16
+};
+
+// A species' cloud of cards.
+struct CardKind {
+    uint first_card;                  // of all cards
+    uint full_count;                  // cards of the full cloud, behind which are those of its far form
+    uint far_count;                   // cards of that
+    uint tree_count;                  // trees in view that are cards: each frame's
+};
+
+// What finding and drawing the trees that are clouds of cards takes.
+struct CardParameters {
+    uint tree_capacity;               // trees that fit
+    uint species_count;               // of the scene
+    uint cloud_bins;                  // distance bins in which trees can be full clouds
+    uint far_bins;                    // first distance bin in which one can be its far form
+    uint card_bins;                   // distance bins in which trees can be cards
+    uint cloud_cards;                 // of the largest full cloud
+    float fade_pixels;                // apparent height of a tree from which on its full cloud gives way to the far form
+    uint far_form;                    // 1: what is drawn is the far form
+};
+
+// What lighting cards takes.
+struct CardLightParameters {
+    uvec2 size;                       // of the image, pixels
+    vec2 top;                         // height to which what trees hide of the sky is known, m; 1 over it
 };
 
 // What lighting meshes takes.

@@ -19,6 +19,8 @@ use crate::settings::{KNOBS, Settings, nearest};
 pub enum Rung {
     /// The model's own triangles, lit leaf by leaf (BBP08).
     Mesh,
+    /// A cloud of textured cards a tree, and fewer of them farther away (BCF05, section 2).
+    Cards,
     /// A quad a tree, which shows three of its depth views (BN12, section 5).
     ZField,
     /// A shader of the ground, for all trees together (BN12, section 6).
@@ -26,12 +28,16 @@ pub enum Rung {
 }
 
 /// Number of rungs.
-const RUNGS: usize = 3;
+const RUNGS: usize = 4;
 
 impl Rung {
     /// All, near to far, with the names that users write.
-    pub const NAMES: [(&'static str, Rung); RUNGS] =
-        [("mesh", Rung::Mesh), ("zfield", Rung::ZField), ("shader-map", Rung::ShaderMap)];
+    pub const NAMES: [(&'static str, Rung); RUNGS] = [
+        ("mesh", Rung::Mesh),
+        ("cards", Rung::Cards),
+        ("zfield", Rung::ZField),
+        ("shader-map", Rung::ShaderMap),
+    ];
 
     /// The name that users write.
     pub fn name(self) -> &'static str {
@@ -64,14 +70,14 @@ impl Default for Ladder {
 impl Ladder {
     /// What scenes have that say nothing: all rungs, and no meshes where the rasteriser, the device or the memory does not take them.
     pub const AUTO: Ladder =
-        Ladder { steps: [step(Rung::Mesh), step(Rung::ZField), step(Rung::ShaderMap)], yields: true };
+        Ladder { steps: [step(Rung::Mesh), step(Rung::ZField), step(Rung::ShaderMap), None], yields: true };
     /// z-fields near, the shader-map far (BN12).
     pub const BN12: Ladder =
-        Ladder { steps: [step(Rung::ZField), step(Rung::ShaderMap), None], yields: false };
+        Ladder { steps: [step(Rung::ZField), step(Rung::ShaderMap), None, None], yields: false };
     /// z-fields at any distance.
-    pub const ZFIELD: Ladder = Ladder { steps: [step(Rung::ZField), None, None], yields: false };
+    pub const ZFIELD: Ladder = Ladder { steps: [step(Rung::ZField), None, None, None], yields: false };
     /// The shader-map at any distance.
-    pub const SHADER_MAP: Ladder = Ladder { steps: [step(Rung::ShaderMap), None, None], yields: false };
+    pub const SHADER_MAP: Ladder = Ladder { steps: [step(Rung::ShaderMap), None, None, None], yields: false };
 
     /// Ladders that have a name of their own.
     pub const SHORTHANDS: [(&'static str, Ladder); 3] =
@@ -85,7 +91,7 @@ impl Ladder {
 
     /// The same without meshes, for a ladder that may go without; `None` for others.
     pub fn without_meshes(&self) -> Option<Ladder> {
-        let steps = [self.steps[1], self.steps[2], None];
+        let steps = [self.steps[1], self.steps[2], self.steps[3], None];
         self.yields.then_some(Ladder { steps, yields: false })
     }
 
@@ -95,6 +101,16 @@ impl Ladder {
 
     /// Whether a rung draws trees one by one.
     pub fn draws_trees(&self) -> bool {
+        self.cards() || self.z_fields()
+    }
+
+    /// Whether some of them are clouds of cards.
+    pub fn cards(&self) -> bool {
+        self.has(Rung::Cards)
+    }
+
+    /// Whether some of them, behind all others, are z-fields.
+    pub fn z_fields(&self) -> bool {
         self.has(Rung::ZField)
     }
 
@@ -118,10 +134,10 @@ impl Ladder {
         let mut rest = self.steps.iter_mut().flatten().peekable();
         while let Some(step) = rest.next() {
             if rest.peek().is_some() {
-                let knob = if step.rung == Rung::Mesh {
-                    settings.mesh_min_pixels
-                } else {
-                    settings.zfield_min_pixels
+                let knob = match step.rung {
+                    Rung::Mesh => settings.mesh_min_pixels,
+                    Rung::Cards => settings.cards_min_pixels,
+                    _ => settings.zfield_min_pixels,
                 };
                 step.pixels = step.pixels.or(Some(f64::from(knob)));
             }
@@ -137,12 +153,22 @@ impl Ladder {
 
     /// Apparent height under which trees are no longer drawn one by one, pixels; 0 where they always are.
     pub fn least_pixels(&self, settings: &Settings) -> f64 {
-        self.pixels_of(Rung::ZField, settings)
+        self.pixels_of(if self.z_fields() { Rung::ZField } else { Rung::Cards }, settings)
     }
 
     /// Distance to which trees are meshes that would be `pixels` high at one metre, m; 0 where none is.
     pub fn mesh_range(&self, settings: &Settings, pixels: f64) -> f64 {
         if self.meshes() { pixels / self.pixels_of(Rung::Mesh, settings) } else { 0.0 }
+    }
+
+    /// Distance to which trees that would be `pixels` high at one metre are clouds of cards, m, where z-fields are behind them; `None` where cards are
+    /// the last that are drawn one by one; 0 where none is.
+    pub fn card_range(&self, settings: &Settings, pixels: f64) -> Option<f64> {
+        match (self.cards(), self.z_fields()) {
+            (false, _) => Some(0.0),
+            (true, true) => Some(pixels / self.pixels_of(Rung::Cards, settings)),
+            (true, false) => None,
+        }
     }
 
     /// Distance to which trees are drawn one by one that would be `pixels` high at one metre, m: to where they hand over, or, where
@@ -153,6 +179,11 @@ impl Ladder {
             (true, true) => pixels / self.least_pixels(settings),
             (true, false) => farthest / fade_begin(),
         }
+    }
+
+    /// What is wrong with heights, and the remedy, where they do not grow smaller from rung to rung: knobs may say some.
+    pub fn contradicts(&self) -> Option<(String, String)> {
+        self.descends().err()
     }
 
     /// That heights written down grow smaller from rung to rung, or what is wrong and the remedy.
@@ -216,6 +247,9 @@ impl fmt::Display for LadderError {
 
 impl std::error::Error for LadderError {}
 
+/// What must stand behind meshes.
+const MESHES_HAND_OVER: &str = "meshes hand over to z-fields or cards: write mesh:256,zfield:4,shader-map or mesh:256,cards:30,shader-map";
+
 /// The rungs by name, for messages.
 fn rung_names() -> String {
     Rung::NAMES.map(|n| n.0).join(", ")
@@ -252,12 +286,9 @@ impl FromStr for Ladder {
                 Some(given) => Some(height(rung, given).map_err(|(what, remedy)| wrong(what, remedy))?),
                 None => None,
             };
-            if last == Some(Rung::Mesh) && rung != Rung::ZField {
+            if last == Some(Rung::Mesh) && rung == Rung::ShaderMap {
                 let what = format!("{name} behind mesh");
-                return Err(wrong(
-                    what,
-                    "meshes hand over to z-fields: write mesh:256,zfield:4,shader-map".into(),
-                ));
+                return Err(wrong(what, MESHES_HAND_OVER.into()));
             }
             // Rungs ascend, so there are no more than steps.
             steps[k] = Some(Step { rung, pixels });
@@ -267,7 +298,7 @@ impl FromStr for Ladder {
         if last == Some(Rung::Mesh) {
             return Err(LadderError {
                 what: format!("\"{text}\": mesh at any distance"),
-                remedy: "meshes hand over to z-fields: write mesh:256,zfield:4,shader-map".into(),
+                remedy: MESHES_HAND_OVER.into(),
             });
         }
         ladder
@@ -292,6 +323,7 @@ fn rung(name: &str) -> Result<Rung, (String, String)> {
 fn height(rung: Rung, text: &str) -> Result<f64, (String, String)> {
     let (knob, example) = match rung {
         Rung::Mesh => ("mesh_min_pixels", "mesh:256"),
+        Rung::Cards => ("cards_min_pixels", "cards:30"),
         _ => ("zfield_min_pixels", "zfield:4"),
     };
     let range = KNOBS.iter().find(|k| k.name == knob).map_or(0.0..=0.0, |k| k.min..=k.max);
@@ -315,6 +347,9 @@ mod tests {
         for text in [
             "mesh:256,zfield:4,shader-map",
             "mesh,zfield",
+            "mesh:256,cards:30,shader-map",
+            "mesh:256,cards,zfield:4,shader-map",
+            "cards",
             "zfield:0.25,shader-map",
             "zfield,shader-map",
             "zfield",
@@ -342,7 +377,7 @@ mod tests {
     #[test]
     fn what_is_no_ladder_is_refused_with_the_place_and_a_remedy() {
         for (text, what, remedy) in [
-            ("", "rung 1 of \"\": no name", "the rungs are: mesh, zfield, shader-map"),
+            ("", "rung 1 of \"\": no name", "the rungs are: mesh, cards, zfield, shader-map"),
             ("mesh", "mesh at any distance", "write mesh:256,zfield:4,shader-map"),
             ("mesh:256", "mesh at any distance", "write mesh:256,zfield:4,shader-map"),
             (
@@ -353,7 +388,7 @@ mod tests {
             ("mesh:8,zfield:4", "\"8\" is no height", "16 to 65536 pixels, such as mesh:256"),
             ("mesh:16,zfield:32,shader-map", "32 pixels behind 16", "smaller heights"),
             ("zfield:4,mesh:256", "mesh after zfield", "near to far"),
-            ("zfield:4,shells", "no rung \"shells\"", "the rungs are: mesh, zfield, shader-map"),
+            ("zfield:4,shells", "no rung \"shells\"", "the rungs are: mesh, cards, zfield, shader-map"),
             ("zfeild", "no rung \"zfeild\"", "did you mean \"zfield\"?"),
             ("zfield:4", "the last rung goes on to the horizon", "leave out \":4\""),
             ("zfield:4,shader-map:2", "rung 2 of", "leave out \":2\""),
@@ -366,6 +401,9 @@ mod tests {
                 "rung 2 of \"shader-map:4,zfield\": zfield after shader-map",
                 "near to far",
             ),
+            ("zfield:12,cards:4,shader-map", "cards after zfield", "near to far"),
+            ("mesh:256,cards:4", "the last rung goes on to the horizon", "leave out \":4\""),
+            ("cards:0,shader-map", "\"0\" is no height", "0.25 to 4096 pixels, such as cards:30"),
             ("zfield:4,zfield", "zfield after zfield", "each rung once"),
             ("zfield:4,", "rung 2 of \"zfield:4,\": no name", "the rungs are"),
         ] {
@@ -383,11 +421,28 @@ mod tests {
         assert_eq!(Ladder::BN12.range(&settings, 1000.0, 3000.0), 200.0);
         assert_eq!(Ladder::AUTO.resolved(&settings).to_string(), "mesh:256,zfield:5,shader-map");
         assert_eq!(four.resolved(&settings), four);
+        // What is written may contradict what knobs say.
+        let both: Ladder = "mesh:20,cards,shader-map".parse().unwrap();
+        assert!(
+            both.contradicts().is_none()
+                && both.resolved(&settings).contradicts().unwrap().0.contains("30 pixels behind 20")
+        );
         assert_eq!(Ladder::SHADER_MAP.range(&settings, 1000.0, 3000.0), 0.0);
         let near: Ladder = "mesh:200,zfield,shader-map".parse().unwrap();
         assert_eq!((near.mesh_range(&settings, 1000.0), near.range(&settings, 1000.0, 3000.0)), (5.0, 200.0));
         assert_eq!(near.resolved(&settings).to_string(), "mesh:200,zfield:5,shader-map");
         assert_eq!(Ladder::BN12.mesh_range(&settings, 1000.0), 0.0);
+        assert_eq!(Ladder::BN12.card_range(&settings, 1000.0), Some(0.0));
+        // Cards hand over to what is behind them; where that is the average, as the last that are drawn one by one do.
+        let [to_zfields, last]: [Ladder; 2] =
+            ["mesh:200,cards:20,zfield:4,shader-map", "mesh:200,cards:20,shader-map"]
+                .map(|l| l.parse().unwrap());
+        assert_eq!(
+            (to_zfields.card_range(&settings, 1000.0), to_zfields.range(&settings, 1000.0, 3000.0)),
+            (Some(50.0), 250.0)
+        );
+        assert_eq!((last.card_range(&settings, 1000.0), last.range(&settings, 1000.0, 3000.0)), (None, 50.0));
+        assert!(last.draws_trees() && last.cards() && !last.z_fields() && last.hands_over());
         // The farthest tree of z-fields alone is opaque, and nothing is handed over there.
         let relative = 3000.0 / Ladder::ZFIELD.range(&settings, 1000.0, 3000.0);
         assert!((handover::tree_fade(relative, 0.0) - 1.0).abs() < 1e-6 && relative > 0.79);

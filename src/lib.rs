@@ -48,7 +48,9 @@
 //! | BN12 §8, many layers of trees: seen first, lit once | [`frame::trees::tiles`], [`frame::seen_ground`] | `frame/trees/tiles/*`, `frame/ground*.comp` | `tests/gpu/tiles.rs`, `measure/conform/tiles.rs` |
 //! | wind: sway, flutter, gusts (Boulanger et al. 2008, section 7) | [`physics::wind`] | `physics/wind.glsl`, `forest/sway.glsl`, `frame/trees/meshes/corner.glsl` | `tests/gpu/wind.rs` |
 //! | Monte-Carlo reference (Kajiya 1986), error of every pixel | [`mod@reference`] | | `tests/reference.rs` |
-//! | billboard clouds (Behrendt et al. 2005, section 2), written as models | [`bake::cards`] | | `tests/cards.rs` |
+//! | billboard clouds (Behrendt et al. 2005, section 2) | [`bake::cards`], [`forest::cards`], [`frame::trees::cards`] | `frame/trees/cards/*` | `tests/cards.rs`, `tests/gpu/cards.rs`, `tests/proofs/near.rs` |
+//! | light by spherical harmonics (Behrendt et al. 2005, section 4; Sloan et al. 2002) | [`physics::harmonics`], [`bake::harmonics`], [`forest::forest_sky`] | `physics/harmonics.glsl`, `physics/received.glsl`, `physics/forest_sky.glsl` | `tests/gpu/harmonics.rs` |
+//! | shell textures (Behrendt et al. 2005, section 3), their bake | [`bake::shells`] | | `tests/shells.rs` |
 //! | pictures of several frames (Haeberli & Akeley 1990) | [`frame::accumulation`] | `frame/accumulation.comp` | `tests/gpu/accumulation.rs` |
 //! | hand-over of meshes to z-fields, by direction and by distance | | | `tests/proofs/near.rs` |
 //! | parallel-split shadow maps (Zhang et al. 2006) | [`camera::cascades`], [`frame::shadows`] | `frame/trees/zfield_shadow.*`, `physics/shadow.glsl` | `tests/gpu/light_on_ground.rs` |

@@ -88,7 +88,12 @@ knobs! {
     leaf_pixels: f32, "px", 0.0..=256.0, [8.0, 6.0, 4.0], draw [12.0, 8.0, 6.0, 4.0, 0.0], "least side of a card of leaves on the screen: meshes whose cards would be smaller have fewer and larger ones, and coarser bark (0: meshes are always whole); cost of far meshes falls with its inverse square";
     mesh_shadow_texels: f32, "texels", 1.0..=1024.0, [16.0, 8.0, 2.0], draw [32.0, 16.0, 8.0, 4.0, 2.0], "least texels of a shadow map along a leaf for trees to cast into it as meshes, where any are, rather than as z-fields; cost of shadows of a moving camera grows with the inverse square";
     leaf_directions: u32, "", 8..=26, [14, 26, 26], bake [], "directions (8, 14 or 26) in which a leaf of a mesh knows the crown around it (BBP08: 8); memory, and time a pixel of mesh, grow in proportion";
+    light_model: u32, "", 0..=1, [0, 0, 0], bake [], "how meshes are lit: 0 leaf by leaf by the crown around them (BBP08), 1 by spherical harmonics of three bands, as clouds of cards are (BCF05), smoother and at a third of the memory";
     indirect: u32, "", 0..=1, [0, 1, 1], bake [0, 1], "1: light that met more than one surface counts, what leaves, bark and ground hand to each other (10 to 30 % of all); 0: it is left out; bake time";
+    cards: u32, "", 12..=500, [60, 60, 200], bake [30, 60, 120, 200], "most cards of a tree's cloud (BCF05: 50 to 200), where the ladder has that rung; time grows in proportion";
+    card_atlas: u32, "texels", 256..=4096, [512, 1024, 2048], bake [256, 512, 1024, 2048], "texels a side of the pictures of all cards of a species (a power of two); memory grows with the square: 12 MB at 1024";
+    cards_min_pixels: f32, "px", 0.25..=4096.0, [30.0, 30.0, 30.0], draw [60.0, 30.0, 15.0], "apparent tree height under which trees are no longer clouds of cards, where the ladder has that rung; cost grows with its inverse square";
+    cloud_min_pixels: f32, "px", 1.0..=65536.0, [128.0, 64.0, 32.0], draw [256.0, 128.0, 64.0, 32.0], "apparent tree height under which a cloud of cards begins to give way to its far form of three cards, which it has at half of it";
     zfield_min_pixels: f32, "px", 0.25..=64.0, [6.0, 4.0, 3.0], draw [8.0, 6.0, 4.0, 3.0, 2.0, 1.5], "apparent tree height under which trees are no longer drawn one by one; cost grows with its inverse square";
     convergence: f32, "", 0.1..=0.8, [0.4, 0.45, 0.45], draw [0.3, 0.4, 0.45, 0.6, 0.8], "part of the tree-by-tree range at which light and shadow have become the averages of the tables (BN12, eq. 22-25: 0.8); cost of shadows grows with the square";
     silhouette_min_pixels: f32, "px", 0.25..=64.0, [1.0, 1.0, 1.0], draw [2.0, 1.0, 0.5], "apparent height under which trees on the silhouettes of ridges are no longer drawn either; from zfield_min_pixels on they are as others";
@@ -139,9 +144,10 @@ impl Settings {
             return Err(Error::Usage(format!("no knob \"{name}\"{hint}")));
         };
         let whole = !knob.whole || value.fract() == 0.0;
-        let power =
-            !matches!(name, "view_resolution" | "transfer_resolution" | "coverage_size" | "cascade_size")
-                || (value as u64).is_power_of_two();
+        let power = !matches!(
+            name,
+            "view_resolution" | "transfer_resolution" | "card_atlas" | "coverage_size" | "cascade_size"
+        ) || (value as u64).is_power_of_two();
         let one_of = match name {
             "samples" => matches!(value as u32, 1 | 4 | 8),
             "leaf_directions" => matches!(value as u32, 8 | 14 | 26),
@@ -149,7 +155,13 @@ impl Settings {
         };
         if !value.is_finite() || value < knob.min || value > knob.max || !whole || !power || !one_of {
             let kind = match name {
-                _ if !power || name.ends_with("_size") || name.ends_with("_resolution") => "a power of two, ",
+                _ if !power
+                    || name.ends_with("_size")
+                    || name.ends_with("_resolution")
+                    || name.ends_with("_atlas") =>
+                {
+                    "a power of two, "
+                }
                 _ if knob.whole => "a whole number, ",
                 _ => "",
             };

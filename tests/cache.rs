@@ -213,7 +213,16 @@ fn of_scene(scene: &Scene, needs: Needs, dir: &Path) -> (Baked, BakedFrom) {
 }
 
 fn from(views: CacheState, transfer: Option<CacheState>, tables: CacheState) -> BakedFrom {
-    BakedFrom { views, transfer, tables, envelopes: None, levels: None, indirect: None }
+    BakedFrom {
+        views,
+        transfer,
+        tables,
+        envelopes: None,
+        levels: None,
+        harmonics: None,
+        cards: None,
+        indirect: None,
+    }
 }
 
 /// Baked once with all.
@@ -320,7 +329,10 @@ fn what_a_plan_does_not_need_is_not_baked() {
     assert_eq!(without(|s| s.cameras[0].position[2] = 1e5), average);
     assert_eq!(without(|s| s.settings.indirect = 1), Needs::ALL);
     let bare = without(|s| s.species.clear());
-    assert_eq!(bare, Needs { trees: false, transfer: false, envelopes: false, indirect: false });
+    assert_eq!(
+        bare,
+        Needs { trees: false, transfer: false, envelopes: false, cards: false, indirect: false }
+    );
 
     let dir = tempfile::tempdir().unwrap();
     assert!(load_or_bake_scene(&scene, bare, Some(dir.path()), true).unwrap().is_empty());

@@ -237,7 +237,10 @@ fn a_ladder_is_the_scenes_or_the_one_that_is_given() {
     let quiet = ["--quiet", "--json"];
     for command in ["render", "bench", "plan", "reflectance"] {
         for (args, hint) in [
-            (&["--ladder", "cards:256,zfield:4,shader-map"][..], "the rungs are: mesh, zfield, shader-map"),
+            (
+                &["--ladder", "shells:256,zfield:4,shader-map"][..],
+                "the rungs are: mesh, cards, zfield, shader-map",
+            ),
             (&["--ladder", "zfield:4"], "the last rung goes on to the horizon"),
             (&["--ladder", "shader-map,zfield"], "near to far"),
             (&["--ladder", "zfield,shader-map", "--representation", "auto"], "cannot be used with"),
@@ -248,7 +251,7 @@ fn a_ladder_is_the_scenes_or_the_one_that_is_given() {
     }
     let folder = dir.path().join("s").display().to_string();
     let text = refused(2, &["sweep", &file, "-o", &folder, "--ladder", "shells"]);
-    assert!(text.contains("the rungs are: mesh, zfield, shader-map"), "{text}");
+    assert!(text.contains("the rungs are: mesh, cards, zfield, shader-map"), "{text}");
 }
 
 #[test]

@@ -100,7 +100,8 @@ fn a_sweep_ends_goes_on_parts_and_joins() {
     // Names of the JSON and CSV stay.
     let mut one = whole.clone();
     one["identity"]["presets"] = whole["identity"]["presets"]["fast"].clone();
-    let named = ["presets", "settings", "most_accurate", "assets", "variables", "changed", "regions"];
+    let named =
+        ["presets", "settings", "most_accurate", "assets", "variables", "changed", "regions", "ranges"];
     let found = keys::keys(&one, &named);
     assert!(found == include_str!("data/sweep_keys.txt"), "{found}");
     let csv = std::fs::read_to_string(at.join("whole/sweep.csv")).unwrap();
@@ -284,6 +285,7 @@ fn differences_of_images_are_told() {
         "image",
         "not_finite",
         "over_distance",
+        "ranges",
         "reference",
         "reference_noise",
         "regions",

@@ -87,6 +87,20 @@ float density_of(Seed s) {
     return root * root;
 }
 
+// Opacity of what a tree is to a range, a unit of its scale.
+float fade_to(float range, Seed s, float distance) {
+    return range > 0.0 ? tree_fade(distance / (range * s.scale), unit(hash(s.identity ^ HASH_FADE))) : 0.0;
+}
+
+// In how many samples a tree is its mesh, and in how many that or its cloud of cards, rounded as opacities are, once a tree. Both with the same
+// dither, so that the second are no fewer.
+uint near_samples(Seed s, Species kind, float distance, float fade) {
+    float dither = unit(hash(s.identity ^ HASH_MESH));
+    uint mesh = covered_samples(fade_to(kind.mesh_range, s, distance), dither, SAMPLES);
+    uint cards = covered_samples(fade * fade_to(kind.card_range, s, distance), dither, SAMPLES);
+    return mesh << 8u | max(mesh, cards) << 12u;
+}
+
 Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     View v = view.v;
     Tree t;
@@ -125,7 +139,8 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     float relative = distance / kind.range;
     eye = eye / (kind.scale_to_metres * s.scale);
     float inside = max(length(eye.xy), abs(eye.z));
-    t.fade = range_fade(q, s, centre, kind, relative) * smoothstep(1.05, 1.35, inside);
+    float fade = range_fade(q, s, centre, kind, relative);
+    t.fade = fade * smoothstep(1.05, 1.35, inside);
     vec3 ground = ground_of(s);
     float density = density_of(s);
     float tint = 1.0 + 0.3 * (float(s.turn_tint >> 16u) / 65535.0 - 0.5);
@@ -149,11 +164,7 @@ Tree make_tree(SeedQuad q, Seed s, vec3 centre, Species kind) {
     // What the hole leaves of it, brought to what is seen of the tables' forest along this direction, unless it was measured by height.
     if (!INDIRECT) t.sky *= table_ground(view_table, table_zenith(slope.u.v, TABLE_ANGLES), table_density(thickness, kind.max_thickness, TABLE_DENSITIES),
                           species, TABLE_ANGLES, TABLE_DENSITIES).z;
-    // Rounded as opacities are, once a tree.
-    float mesh_range = kind.mesh_range * s.scale;
-    float mesh = mesh_range > 0.0 ? tree_fade(distance / mesh_range, unit(hash(s.identity ^ HASH_FADE))) : 0.0;
-    uint samples = covered_samples(mesh, unit(hash(s.identity ^ HASH_MESH)), SAMPLES);
-    t.cascade_tint = cascade_at(v.cascade_far, v.cascade_count, distance) | samples << 8u | packHalf2x16(vec2(0.0, tint));
+    t.cascade_tint = cascade_at(v.cascade_far, v.cascade_count, distance) | near_samples(s, kind, distance, fade) | packHalf2x16(vec2(0.0, tint));
     t.species |= sway;
     return t;
 }

@@ -12,10 +12,10 @@ layout(binding = 7) uniform samplerBuffer nodes;    // of four texels
 layout(constant_id = 2) const uint SAMPLES = 4u;
 layout(constant_id = 4) const bool SKY_DRAWN = false; // in the picture already, as if all samples saw it
 
-// The quad of the ground that a sample sees, counted from 1; 0 where it sees the sky, or a mesh before either.
+// The quad of the ground that a sample sees, counted from 1; 0 where it sees the sky, or a mesh or card before either.
 uint ground_quad(ivec2 pixel, int k) {
     uint surface = surface_seen(pixel, k);
-    return is_mesh(surface) ? 0u : surface;
+    return is_ground(surface) ? surface : 0u;
 }
 
 TerrainQuad fetch_quad(uint quad) {

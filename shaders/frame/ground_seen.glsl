@@ -8,8 +8,8 @@
 
 layout(local_size_x = 8) in;
 layout(binding = 8) uniform usamplerBuffer trees_seen; // counted from 1, a sample
-layout(constant_id = 11) const bool MESHES = false; // some are drawn before the ground
-layout(constant_id = 3) const bool TREES = true;    // some are drawn before the ground
+layout(constant_id = 11) const bool NEAR_TREES = false; // meshes or cards are drawn before the ground
+layout(constant_id = 3) const bool TREES = true;    // z-fields are drawn before the ground
 
 shared uint items[8u * TILE_SIDE]; // pixels of each column to shade: its row | samples of the ground << 8 | of the sky << 16
 
@@ -22,7 +22,7 @@ void list_pixels(uvec2 corner, uint column, uvec2 size) {
         int at = int((pixel.y * size.x + pixel.x) * SAMPLES);
         uint open = (1u << SAMPLES) - 1u, samples = ground_samples(ivec2(pixel));
         for (uint k = 0u; k < SAMPLES; k++) {
-            bool hidden = MESHES && is_mesh(surface_seen(ivec2(pixel), int(k)));
+            bool hidden = NEAR_TREES && !is_ground(surface_seen(ivec2(pixel), int(k)));
             if (TREES) hidden = hidden || texelFetch(trees_seen, at + int(k)).x != 0u;
             open &= hidden ? ~(1u << k) : ~0u;
         }

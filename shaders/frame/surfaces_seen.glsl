@@ -1,5 +1,5 @@
 // What samples see of the surfaces that the graphics pipeline draws, ground and meshes: which, and how deep.
-#include "frame/trees/meshes/seen.glsl"
+#include "frame/trees/near_seen.glsl"
 
 #ifdef SINGLE
 layout(binding = 10) uniform sampler2DArray depth;

@@ -7,13 +7,17 @@
 //!   models, their reflectances and densities, and the ground.
 //! - `.levels`, coarser meshes ([`super::levels`]): of the model.
 //! - `.envelopes`, the crown around each leaf ([`super::envelope`]): of the model and of the number of directions.
+//! - `.harmonics`, how light comes to the faces of a model ([`super::harmonics`]): of the model.
+//! - `.cards`, a cloud of cards ([`super::cards`]): of the model and of the knobs of cards.
 //! - `.shells`, forest far away as slices ([`super::shells`]): of a forest's models, reflectances, scales, densities and point pattern.
 //! - `.forest`, the tables of far forests ([`super::tables`]): of both.
 
 use std::path::{Path, PathBuf};
 
+use super::cards::{self, CardCloud, CloudSettings};
 use super::envelope::{Envelopes, Parts, RAYS};
 use super::file::{Fields, Format, load_or_build};
+use super::harmonics::{self, Harmonics};
 use super::hiding::HEIGHTS;
 use super::indirect::{self, Mix};
 use super::levels::{self, Levels};
@@ -186,6 +190,22 @@ impl<'a> Source<'a> {
     /// [`crate::Error::Usage`] for a mesh without extent.
     pub fn load_levels(&self) -> Result<(Levels, CacheState)> {
         levels::file::load(self.mesh, self.dir, self.quiet)
+    }
+
+    /// How light comes to its faces, likewise.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] for a mesh without extent.
+    pub fn load_harmonics(&self) -> Result<(Harmonics, CacheState)> {
+        harmonics::file::load(self.mesh, self.dir, self.quiet)
+    }
+
+    /// A cloud of cards, to whose faces light comes so, likewise.
+    ///
+    /// # Errors
+    /// Those of [`CardCloud::new`].
+    pub fn load_cards(&self, light: &Harmonics, settings: CloudSettings) -> Result<(CardCloud, CacheState)> {
+        cards::file::load(self.mesh, light, settings, self.dir, self.quiet)
     }
 
     /// The tables of a forest of the species, likewise. Light transfer has a part in them: where they have to be measured, the

@@ -23,7 +23,7 @@ pub const RAYS: u32 = 32;
 /// Of these, rays from one place of the leaf, over the whole sphere.
 const RAYS_A_PLACE: u32 = 32;
 /// Faces that hang together are one leaf up to this radius, as a part of the tree's half width; in larger ones each is its own.
-const LARGEST: f32 = 0.1;
+pub(super) const LARGEST: f32 = 0.1;
 
 /// Which faces of a surface share an envelope: those of a leaf, and of bark those whose middles lie in the same cube.
 #[derive(Clone, Debug, PartialEq)]
@@ -167,7 +167,7 @@ fn root(parent: &mut [u32], mut k: u32) -> u32 {
 }
 
 /// Point k of an even sequence over a part's faces in turn, m, and the face; where its masks leave nothing, their middles.
-fn place(surface: &Surface, faces: &[u32], k: u32) -> (Vec3, u32) {
+pub(super) fn place(surface: &Surface, faces: &[u32], k: u32) -> (Vec3, u32) {
     let on = faces[k as usize % faces.len()];
     let face = &surface.faces[on as usize];
     let [a, b, c] = face.p.map(|p| surface.frame.to_metres(p));

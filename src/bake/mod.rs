@@ -8,6 +8,7 @@ pub mod envelope;
 pub mod file;
 pub(crate) mod foliage;
 pub(crate) mod grove;
+pub mod harmonics;
 pub mod hiding;
 pub mod indirect;
 mod least_squares;

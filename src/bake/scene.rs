@@ -3,7 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::cards::CardCloud;
 use super::envelope::Envelopes;
+use super::harmonics::Harmonics;
 use super::indirect::{Kind, Mix};
 use super::levels::Levels;
 use super::{CacheState, ForestSettings, Source, SpeciesBake, cache};
@@ -25,6 +27,10 @@ pub struct Baked {
     pub envelopes: Option<Arc<Envelopes>>,
     /// Its mesh's levels of detail, likewise.
     pub levels: Option<Arc<Levels>>,
+    /// How light comes to its faces, where spherical harmonics light it.
+    pub harmonics: Option<Arc<Harmonics>>,
+    /// Its cloud of cards, where it is drawn as one.
+    pub cards: Option<Arc<CardCloud>>,
     /// Light that met more than one surface in the scene's forest, where it counts.
     pub indirect: Option<Arc<Indirect>>,
 }
@@ -42,6 +48,10 @@ pub struct BakedFrom {
     pub envelopes: Option<CacheState>,
     /// Its mesh's levels of detail; likewise.
     pub levels: Option<CacheState>,
+    /// How light comes to its faces; likewise.
+    pub harmonics: Option<CacheState>,
+    /// Its cloud of cards; likewise.
+    pub cards: Option<CacheState>,
     /// Light that met more than one surface; `None` where it is left out.
     pub indirect: Option<CacheState>,
 }
@@ -56,19 +66,26 @@ pub struct Needs {
     /// The light transfer of the views, to draw trees one by one. Measuring tables needs it as well and gets it by itself; once
     /// they are in the cache, a plan without z-fields or without a sun does without.
     pub transfer: bool,
-    /// The crown around each leaf and the levels of detail, to draw trees as meshes.
+    /// What light at leaves takes, as the settings have it, and the levels of detail, to draw trees as meshes.
     pub envelopes: bool,
+    /// Clouds of cards, to draw trees as such.
+    pub cards: bool,
     /// Light that met more than one surface, where the settings ask for it.
     pub indirect: bool,
 }
 
 impl Needs {
     /// All but what meshes take, for whoever draws by several plans.
-    pub const ALL: Needs = Needs { trees: true, transfer: true, envelopes: false, indirect: true };
+    pub const ALL: Needs =
+        Needs { trees: true, transfer: true, envelopes: false, cards: false, indirect: true };
 
     /// All that plans of these ladders may need.
     pub fn of(ladders: impl IntoIterator<Item = Ladder>) -> Self {
-        Needs { envelopes: ladders.into_iter().any(|l| l.meshes()), ..Needs::ALL }
+        ladders.into_iter().fold(Needs::ALL, |all, l| Needs {
+            envelopes: all.envelopes || l.meshes(),
+            cards: all.cards || l.cards(),
+            ..all
+        })
     }
 }
 
@@ -78,6 +95,7 @@ impl From<&Plan> for Needs {
             trees: plan.forest,
             transfer: plan.transfer_bands > 0,
             envelopes: plan.meshes,
+            cards: plan.cards,
             indirect: plan.indirect > 0,
         }
     }
@@ -131,18 +149,31 @@ pub fn load_or_bake_scene(
         let mut transfer = if needs.transfer { source.load_transfer(&mut species)? } else { None };
         let (measured, tables) =
             source.load_tables(&forest_settings(scene, k), &mut species, &mut transfer)?;
+        let by_harmonics = scene.settings.light_model == 1;
         let around = || source.load_envelopes(scene.settings.leaf_directions);
-        let around = needs.envelopes.then(around).transpose()?;
+        let around = (needs.envelopes && !by_harmonics).then(around).transpose()?;
+        let transfers = needs.cards || needs.envelopes && by_harmonics;
+        let transfers = transfers.then(|| source.load_harmonics()).transpose()?;
         let coarser = needs.envelopes.then(|| source.load_levels()).transpose()?;
         let (envelopes, levels) = (around.as_ref().map(|a| a.1), coarser.as_ref().map(|l| l.1));
+        let pictures = transfers.as_ref().filter(|_| needs.cards);
+        let pictures =
+            pictures.map(|(light, _)| source.load_cards(light, (&scene.settings).into())).transpose()?;
+        let (harmonics, light) = transfers.map_or((None, None), |(h, from)| (Some(Arc::new(h)), Some(from)));
+        let (cloud, cards) = pictures.map_or((None, None), |(c, from)| (Some(Arc::new(c)), Some(from)));
         let one = Baked {
             species: Arc::new(species),
             tables: Arc::new(measured),
             envelopes: around.map(|a| Arc::new(a.0)),
             levels: coarser.map(|l| Arc::new(l.0)),
+            harmonics,
+            cards: cloud,
             indirect: None,
         };
-        all.push((one, BakedFrom { views, transfer, tables, envelopes, levels, indirect: None }));
+        all.push((
+            one,
+            BakedFrom { views, transfer, tables, envelopes, levels, harmonics: light, cards, indirect: None },
+        ));
     }
     if needs.trees && needs.indirect && scene.settings.indirect > 0 {
         load_indirect_light(scene, (&mut all, &keys), dir, quiet)?;

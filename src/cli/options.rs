@@ -59,12 +59,20 @@ pub struct QualityOptions {
     /// Set one knob; repeatable. The order: preset, then the scene's own knobs, then each --set
     #[arg(long, value_name = "KNOB=VALUE", value_parser = assignment)]
     pub set: Vec<(String, f64)>,
+    /// How meshes are lit: leaf by leaf by the crown around them (BBP08), or by spherical harmonics as clouds of cards are (BCF05). Shorthand for the knob
+    /// light_model
+    #[arg(long, value_name = "NAME", value_parser = named(LIGHT_MODELS))]
+    pub light_model: Option<f64>,
 }
 
+/// Values of the knob `light_model` with the names that users write.
+const LIGHT_MODELS: [(&str, f64); 2] = [("leaf", 0.0), ("sh", 1.0)];
+
 impl QualityOptions {
-    /// Applies each `--set`.
+    /// Applies each `--set`, and `--light-model`.
     pub fn set(&self, settings: &mut Settings) -> Result<()> {
-        self.set.iter().try_for_each(|(name, value)| settings.set(name, *value))
+        let model = self.light_model.map(|value| ("light_model".to_string(), value));
+        self.set.iter().chain(&model).try_for_each(|(name, value)| settings.set(name, *value))
     }
 
     /// The settings where no scene has a say.

@@ -401,11 +401,16 @@ fn choose(args: &Args, gpu: &Gpu, scene: &Scene, time: Duration) -> Result<Choic
 }
 
 fn trees<'a>(frame: &'a FrameReport, plan: &Plan) -> Trees<'a> {
-    let [all, meshes] = [frame.trees.camera, frame.trees.meshes];
-    let near = plan.meshes.then_some((Rung::Mesh.name(), meshes));
+    let [all, meshes, cards] = [frame.trees.camera, frame.trees.meshes, frame.trees.cards];
+    // In the band of a hand-over a tree is on both of its sides.
+    let rungs = [
+        plan.meshes.then_some((Rung::Mesh.name(), meshes)),
+        plan.cards.then_some((Rung::Cards.name(), cards)),
+        (plan.z_fields || !plan.cards).then_some((Rung::ZField.name(), all - (meshes + cards).min(all))),
+    ];
     Trees {
         in_view: all,
-        by_rung: near.into_iter().chain([(Rung::ZField.name(), all - meshes.min(all))]).collect(),
+        by_rung: rungs.into_iter().flatten().collect(),
         casters_by_cascade: &frame.trees.cascades,
     }
 }

@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use canopy::bake::cache;
 use canopy::image::Layers;
-use canopy::measure::sweep::design::knobs;
+use canopy::ladder::Ladder;
+use canopy::measure::sweep::design::{knobs, used_by};
 use canopy::measure::sweep::judge::judge;
 use canopy::measure::sweep::markdown::markdown;
 use canopy::measure::sweep::run::{PICTURES, Request, sweep};
@@ -28,6 +29,7 @@ Examples:
   canopy sweep -o s --reference truth/                errors against truth/CAMERA.exr, with a layer `variance` if it is noisy
   canopy sweep -o s --reference none                  errors against the most accurate setting only
   canopy sweep -o s --reference-until 1%                  a better reference
+  canopy sweep -o s --ladders mesh:256,zfield:4,shader-map/mesh:256,cards:30,shader-map   both papers' chains at every preset, and no knobs
   canopy sweep -o s                                   again: goes on where it stopped
   canopy sweep -o s1 --shard 1/2; canopy sweep -o s2 --shard 2/2; canopy sweep -o s --from s1 --from s2
   canopy render --budget 50ms --sweep s/sweep.json    the most accurate setting that holds 50 ms there
@@ -50,6 +52,10 @@ pub struct Args {
     /// `samples=1/4`; left out: all that have values to try
     #[arg(long, value_name = "KNOB,…", value_delimiter = ',')]
     knobs: Vec<String>,
+    /// Ladders to draw at every preset as well, with slashes between, such as zfield:4,shader-map/cards:30,shader-map; knobs are then moved only if
+    /// named
+    #[arg(long, value_name = "LADDER/…", value_delimiter = '/', value_parser = str::parse::<Ladder>)]
+    ladders: Vec<Ladder>,
     /// Set one knob in all presets; repeatable
     #[arg(long, value_name = "KNOB=VALUE", value_parser = options::assignment)]
     set: Vec<(String, f64)>,
@@ -113,12 +119,18 @@ pub fn run(args: &Args) -> Result<()> {
         None => None,
     };
     std::fs::create_dir_all(&args.output).map_err(|e| Error::io(&args.output, e))?;
+    let swept = match (args.ladders.is_empty(), args.knobs.is_empty()) {
+        (false, true) => Vec::new(),
+        (true, true) => used_by(knobs(&[])?, &[scene.ladder]),
+        _ => knobs(&args.knobs)?,
+    };
     let mut request = Request {
         scene,
         cameras,
         size: args.size,
         presets,
-        knobs: knobs(&args.knobs)?,
+        knobs: swept,
+        ladders: args.ladders.clone(),
         rounds: args.rounds,
         budget: args.budget.unwrap_or(Duration::MAX),
         shard: args.shard.unwrap_or((1, 1)),

@@ -62,6 +62,8 @@ pub struct TreeCounts {
     pub camera: u32,
     /// Of these, those that are meshes.
     pub meshes: u32,
+    /// And those that are clouds of cards.
+    pub cards: u32,
     /// Casters drawn into each cascade: those of pages that frames before have not left.
     pub cascades: Vec<u32>,
 }
@@ -108,6 +110,11 @@ impl CullData {
     /// How many of the distance bins have trees that are nearer than this, m.
     pub fn bins_within(&self, distance: f64) -> u32 {
         first_bin_from(distance, self.last)
+    }
+
+    /// How many of the distance bins have trees only that are nearer than this, m.
+    pub fn bins_before(&self, distance: f64) -> u32 {
+        (0..DISTANCE_BINS).take_while(|b| bin_end(*b, self.last) <= distance).count() as u32
     }
 
     /// Takes the distances of another plan.

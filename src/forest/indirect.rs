@@ -40,7 +40,7 @@ impl IndirectData {
             .collect::<Result<_>>()?;
         let texels = [ground(&all), species(&all)].concat();
         let handed =
-            if plan.z_fields { gpu.described_buffer(&plan.buffer(resource::HANDED))? } else { none()? };
+            if plan.near_trees { gpu.described_buffer(&plan.buffer(resource::HANDED))? } else { none()? };
         Ok(IndirectData {
             nodes: gpu.described_buffer_with(&plan.buffer(resource::INDIRECT), &texels)?,
             handed,

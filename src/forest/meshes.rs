@@ -4,23 +4,22 @@
 use glam::Vec2;
 use half::f16;
 
+use crate::bake::Baked;
 use crate::bake::envelope::Envelopes;
-use crate::bake::hiding::{self, HEIGHTS};
+use crate::bake::harmonics::Harmonics;
 use crate::bake::levels::Levels;
 use crate::bake::surface::{Face, Mask, Surface};
 use crate::bake::turning::{Turning, packed_place, turning};
-use crate::bake::{Baked, SpeciesBake};
-use crate::forest::species::mean_squared_scale;
+use crate::forest::hidden_sky::HiddenSky;
 use crate::gpu::interface::{
-    BARK_LEVELS, BARK_PIXELS, FADE_BAND, HIDING_STEPS, LEAF_OCTAVES, LEAST_SHARE, MAX_SPECIES,
-    MESH_TRIANGLES, MeshFace, MeshKind, NO_PAGE,
+    BARK_LEVELS, BARK_PIXELS, FADE_BAND, HIDING_STEPS, LEAF_OCTAVES, LEAST_SHARE, MESH_TRIANGLES, MeshFace,
+    MeshKind, NO_PAGE,
 };
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, vk};
-use crate::physics::crown::Crown;
 use crate::physics::leaf::Directions;
 use crate::physics::levels::{self, OCTAVES};
 use crate::plan::names::resource;
-use crate::plan::{Plan, envelope_words};
+use crate::plan::{FACE_TRANSFER_WORDS, Plan, envelope_words};
 use crate::scene::{Scene, Species};
 use crate::{Error, Result};
 
@@ -30,6 +29,8 @@ const _: () = assert!(BARK_PIXELS == levels::BARK_PIXELS as f32);
 
 /// Steps of texture coordinates along a texture; as `UV_STEPS` in `shaders/frame/trees/meshes/corner.glsl`.
 const UV_STEPS: f32 = 2048.0;
+/// Format and bytes of a texel of what trees hide.
+const PAIR: (vk::Format, u64) = (vk::Format::R32G32_SFLOAT, 8);
 /// Most directions of an envelope.
 const MOST_DIRECTIONS: usize = 26;
 
@@ -39,7 +40,7 @@ pub struct MeshData {
     pub corners: Buffer,
     /// [`MeshFace`]s of all triangles.
     pub faces: Buffer,
-    /// Optical thickness of the crown around each triangle.
+    /// Optical thickness of the crown around each triangle, or how light comes to it as spherical harmonics.
     pub envelopes: Buffer,
     /// Where materials are holes, one a layer.
     pub masks: Image,
@@ -67,6 +68,35 @@ pub struct MeshData {
     pub power: u32,
 }
 
+/// What is known of light at the faces of a model.
+enum FaceLight<'a> {
+    /// The crown around them.
+    Envelopes(&'a Envelopes),
+    /// How light comes to them.
+    Harmonics(&'a Harmonics),
+}
+
+impl FaceLight<'_> {
+    /// At a face, in whole words of eight half floats: what its surroundings leave of light above and then below; or both of its sides'
+    /// coefficients.
+    fn of(&self, face: u32) -> Vec<f16> {
+        let padded = |numbers: Vec<f64>, words: usize| {
+            let halves = numbers.into_iter().map(f16::from_f64);
+            halves.chain(std::iter::repeat(f16::ZERO)).take(8 * words).collect::<Vec<_>>()
+        };
+        match self {
+            FaceLight::Envelopes(envelopes) => {
+                let words = envelope_words(envelopes.directions as u32) as usize;
+                envelopes.of(face).iter().flat_map(|thickness| padded(thickness.to_vec(), words)).collect()
+            }
+            FaceLight::Harmonics(harmonics) => {
+                let both = harmonics.faces[face as usize].as_flattened();
+                padded(both.iter().map(|x| f64::from(*x)).collect(), FACE_TRANSFER_WORDS as usize)
+            }
+        }
+    }
+}
+
 /// What all meshes put together hold.
 #[derive(Default)]
 struct Content {
@@ -91,18 +121,23 @@ impl MeshData {
             .ok_or_else(|| Error::Usage("leaf_directions is 8, 14 or 26".into()))?;
         let mut all = Content::default();
         for (species, bake) in scene.species.iter().zip(baked) {
-            let envelopes =
-                bake.envelopes.as_ref().filter(|e| e.directions == rule.len()).ok_or_else(|| {
-                    Error::Usage(
-                        "a species was baked without the crown around its leaves that the plan lists".into(),
-                    )
-                })?;
+            let light = if plan.mesh_harmonics {
+                bake.harmonics.as_deref().map(FaceLight::Harmonics)
+            } else {
+                bake.envelopes.as_deref().filter(|e| e.directions == rule.len()).map(FaceLight::Envelopes)
+            };
+            let light = light.ok_or_else(|| {
+                Error::Usage("a species was baked without what the plan lists of light at its leaves".into())
+            })?;
             let levels = bake.levels.as_ref().ok_or_else(|| {
                 Error::Usage("a species was baked without the levels of detail that the plan lists".into())
             })?;
-            all.add(species, envelopes, levels, plan.wind)?;
+            all.add(species, &light, levels, plan.wind)?;
         }
-        let (pairs, top) = hiding_pairs(scene, baked, rule.len());
+        let (pairs, top) = match plan.mesh_harmonics {
+            true => (Vec::new(), 1.0),
+            false => hiding_pairs(scene, baked, rule.len()),
+        };
         let texels = |name, bytes: &[u8]| -> Result<Buffer> {
             // Faces that are nowhere to be seen are in the plan, and not here.
             let described = plan.buffer(name);
@@ -113,7 +148,10 @@ impl MeshData {
         Ok(MeshData {
             corners: texels(resource::MESH_CORNERS, bytemuck::cast_slice(&all.corners))?,
             faces: texels(resource::MESH_FACES, bytemuck::cast_slice(&all.faces))?,
-            envelopes: texels(resource::ENVELOPES, bytemuck::cast_slice(&bits(&all.envelopes)))?,
+            envelopes: texels(
+                if plan.mesh_harmonics { resource::FACE_TRANSFERS } else { resource::ENVELOPES },
+                bytemuck::cast_slice(&bits(&all.envelopes)),
+            )?,
             masks: masks(gpu, plan, &all.masks)?,
             indices: texels(resource::MESH_INDICES, bytemuck::cast_slice(&all.indices))?,
             kinds: gpu.described_buffer_with(&plan.buffer(resource::MESH_KINDS), &all.kinds)?,
@@ -121,9 +159,12 @@ impl MeshData {
             draw_count: gpu.buffer("mesh draw count", 4)?,
             trees: gpu.described_buffer(&plan.buffer(resource::MESH_TREES))?,
             rule: gpu.buffer_with("leaf directions", &rule_block(&rule))?,
-            hiding: gpu.described_buffer_with(&plan.buffer(resource::HIDING), &pairs)?,
+            hiding: match pairs.is_empty() {
+                true => gpu.texel_buffer("no hidden sky", PAIR.1, PAIR)?,
+                false => gpu.described_buffer_with(&plan.buffer(resource::HIDING), &pairs)?,
+            },
             top: top as f32,
-            optics: gpu.buffer_with("leaf optics", &optics_block(baked))?,
+            optics: gpu.buffer_with("leaf optics", &super::species::optics_block(baked))?,
             species: all.kinds.len() as u32,
             power: rule.power as u32,
         })
@@ -131,7 +172,7 @@ impl MeshData {
 }
 
 impl Content {
-    fn add(&mut self, species: &Species, envelopes: &Envelopes, levels: &Levels, wind: bool) -> Result<()> {
+    fn add(&mut self, species: &Species, light: &FaceLight, levels: &Levels, wind: bool) -> Result<()> {
         let mesh = &species.mesh;
         let surface = Surface::new(mesh)?;
         let count = surface.faces.len() + levels.extra();
@@ -158,7 +199,7 @@ impl Content {
                 rank: levels.cards.rank[at],
                 middle,
             };
-            self.push((&surface, face), kind, envelopes.of(k));
+            self.push((&surface, face), kind, light.of(k));
         }
         let face_count = self.faces.len() as u32 - first_face;
         let mut kind = MeshKind {
@@ -180,7 +221,7 @@ impl Content {
             let first_new = self.faces.len() as u32 - first_face;
             for new in &bark.new {
                 let none = MeshFace { mask: NO_PAGE, ..bytemuck::Zeroable::zeroed() };
-                self.push((&surface, &new.face(&surface)), none, envelopes.of(new.like));
+                self.push((&surface, &new.face(&surface)), none, light.of(new.like));
             }
             let all = bark.kept.iter().copied().chain((first_new..).take(bark.new.len()));
             kind.first_bark[level] = self.order(first_face, all);
@@ -193,15 +234,11 @@ impl Content {
         Ok(())
     }
 
-    /// A triangle, and what its surroundings leave of light above and below.
-    fn push(&mut self, (surface, face): (&Surface, &Face), kind: MeshFace, around: [&[f64]; 2]) {
+    /// A triangle, and what is known of light at it.
+    fn push(&mut self, (surface, face): (&Surface, &Face), kind: MeshFace, light: Vec<f16>) {
         self.corners.extend(corners(surface, face));
         self.faces.push(kind);
-        for thickness in around {
-            let words = 8 * envelope_words(thickness.len() as u32) as usize;
-            let halves = thickness.iter().map(|t| f16::from_f64(*t));
-            self.envelopes.extend(halves.chain(std::iter::repeat(f16::ZERO)).take(words));
-        }
+        self.envelopes.extend(light);
     }
 
     /// Indices of a model's triangles in an order, and the first of them.
@@ -238,55 +275,18 @@ fn rule_block(rule: &Directions) -> Vec<[f32; 4]> {
 }
 
 /// What the scene's trees hide of the sky at heights above the ground, evenly to the top of the tallest of middle scale: of each direction, pairs of
-/// what it is at a step and how much more at the next, a unit of the optical thickness of all crowns. Species share that as they do in the whole
-/// scene: where each of them stands is not known. Also the height of the top, m.
+/// what it is at a step and how much more at the next, a unit of the optical thickness of all crowns. Also the height of the top, m.
 fn hiding_pairs(scene: &Scene, baked: &[Baked], directions: usize) -> (Vec<[f32; 2]>, f64) {
-    let frames: Vec<(Crown, f64)> = scene
-        .species
-        .iter()
-        .zip(baked)
-        .map(|(s, b)| (b.species.crown, 0.5 * f64::from(s.scale[0] + s.scale[1])))
-        .collect();
-    let top_of =
-        |(crown, scale): &(Crown, f64)| f64::from(crown.frame.centre + crown.frame.half_height) * scale;
-    let top = frames.iter().map(top_of).fold(1e-3, f64::max);
-    let shares: Vec<f64> =
-        scene.species.iter().zip(&frames).map(|(s, (crown, _))| thickness(scene, s, crown)).collect();
-    let total = shares.iter().sum::<f64>().max(1e-12);
-    let at = |direction: usize, metres: f64| -> f64 {
-        let of = |k: usize| {
-            let (crown, scale) = &frames[k];
-            let height =
-                (metres / scale - f64::from(crown.frame.centre)) / f64::from(crown.frame.half_height);
-            let nodes =
-                baked[k].envelopes.as_ref().map_or(&[][..], |e| &e.hiding[direction * HEIGHTS..][..HEIGHTS]);
-            if nodes.is_empty() { 0.0 } else { shares[k] / total * hiding::at_height(nodes, height) }
-        };
-        (0..frames.len()).map(of).sum()
-    };
+    let of = |b: &Baked| b.envelopes.as_ref().map_or(Vec::new(), |e| e.hiding.clone());
+    let hidden = HiddenSky::new(scene, baked, baked.iter().map(of).collect());
     let steps = HIDING_STEPS as usize;
-    let node = |direction: usize, step: usize| at(direction, top * step as f64 / steps as f64);
+    let node = |direction: usize, step: usize| hidden.at(direction, hidden.top * step as f64 / steps as f64);
     let pair = |k: usize| {
         let (direction, step) = (k / steps, k % steps);
         let here = node(direction, step);
         [here, node(direction, step + 1) - here].map(|x| x as f32)
     };
-    ((0..directions * steps).map(pair).collect(), top)
-}
-
-/// Optical thickness of a species' crowns from above in all of a scene, at its full density.
-fn thickness(scene: &Scene, species: &Species, crown: &Crown) -> f64 {
-    let density = species.full_density(scene.terrain.extent);
-    density * std::f64::consts::PI * f64::from(crown.radius).powi(2) * mean_squared_scale(species)
-}
-
-fn optics_block(baked: &[Baked]) -> Vec<[f32; 4]> {
-    let of = |s: &SpeciesBake| {
-        [s.reflectance, s.transmittance, s.bark_reflectance].map(|[r, g, b]| [r, g, b, 0.0])
-    };
-    let mut block: Vec<[f32; 4]> = baked.iter().flat_map(|b| of(&b.species)).collect();
-    block.resize(3 * MAX_SPECIES as usize, [0.0; 4]);
-    block
+    ((0..directions * steps).map(pair).collect(), hidden.top)
 }
 
 /// Uploads masks as layers of one array. Of the finest level texels are opacities, of which a half is the cutoff; of the others, shares of the

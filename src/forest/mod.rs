@@ -2,9 +2,12 @@
 //! draws.
 
 pub mod cache;
+pub mod cards;
 pub mod casters;
 pub mod coverage;
 pub mod cull;
+pub mod forest_sky;
+pub mod hidden_sky;
 pub mod indirect;
 pub mod meshes;
 pub mod pages;

@@ -141,7 +141,7 @@ impl SeedData {
         self.visible = 0;
         self.visible_quads.clear();
         self.keys.clear();
-        if !plan.z_fields {
+        if !plan.near_trees {
             return Ok(SeedWork::default());
         }
         let mut visible = self.select(tree, eye, plan.range);

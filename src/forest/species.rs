@@ -1,6 +1,6 @@
 //! Species on the GPU: the table, the z-field views of all species in one array, view bases, masks and density maps.
 
-use crate::bake::{Baked, tables};
+use crate::bake::{Baked, SpeciesBake, tables};
 use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Resource, Sampler, vk};
 use crate::land::density::{DensityMap, HEIGHT_SOFTNESS, SLOPE_SOFTNESS, density_map};
@@ -64,7 +64,7 @@ impl SpeciesData {
             if bake.views.resolution != resolution || bake.views.n != n {
                 return Err(Error::Usage("a species was baked with other settings than the scene's".into()));
             }
-            for (level, bytes) in bake.views.levels.iter().enumerate().filter(|_| plan.z_fields) {
+            for (level, bytes) in bake.views.levels.iter().enumerate().filter(|_| plan.draws_views()) {
                 gpu.upload_image(&texels, level as u32, k as u32 * view_count, view_count, bytes)?;
             }
         }
@@ -120,6 +120,9 @@ impl SpeciesData {
         }
         for (row, range) in self.rows.iter_mut().zip(&plan.mesh_range) {
             row.mesh_range = if plan.meshes { *range as f32 } else { 0.0 };
+        }
+        for (row, range) in self.rows.iter_mut().zip(&plan.card_range) {
+            row.card_range = if plan.cards { *range as f32 } else { 0.0 };
         }
         gpu.upload(&self.table, 0, &block(&self.rows))
     }
@@ -229,6 +232,16 @@ pub(super) fn mean_squared_scale(species: &Species) -> f64 {
     }
 }
 
+/// Reflectance and transmittance of leaves, and reflectance of bark, of every species, as shaders read them.
+pub(super) fn optics_block(baked: &[Baked]) -> Vec<[f32; 4]> {
+    let of = |s: &SpeciesBake| {
+        [s.reflectance, s.transmittance, s.bark_reflectance].map(|[r, g, b]| [r, g, b, 0.0])
+    };
+    let mut block: Vec<[f32; 4]> = baked.iter().flat_map(|b| of(&b.species)).collect();
+    block.resize(3 * MAX_SPECIES as usize, [0.0; 4]);
+    block
+}
+
 /// A correction's coefficients as the table has them.
 fn coefficients(c: &Correction) -> [[f32; 4]; 4] {
     let all = c.coefficients();
@@ -276,6 +289,7 @@ fn rows(
             sent: coefficients(&bake.sent()),
             transmittance,
             mesh_range: if plan.meshes { plan.mesh_range[k] as f32 } else { 0.0 },
+            card_range: if plan.cards { plan.card_range[k] as f32 } else { 0.0 },
             range: plan.species_range[k] as f32,
             crown_radius: crown.radius,
             bounding_radius: bounding_radius(scene, &crown.frame),

@@ -8,6 +8,7 @@ use super::seen_ground::SeenGround;
 use super::stream::{Moment, Streamed};
 use super::targets::ImageTargets;
 use super::tonemap::Tonemap;
+use super::trees::cards::Cards;
 use super::trees::meshes::Meshes;
 use super::trees::tiles::TreeTiles;
 use super::trees::zfield::Trees;
@@ -39,17 +40,22 @@ struct Seen {
     ground: SeenGround,
     horizon: Option<Horizon>,
     meshes: Option<Meshes>,
+    cards: Option<Cards>,
     trees: Option<TreeTiles>,
 }
 
 impl Seen {
     fn new(gpu: &Gpu, (scene, plan): (&Scene, &Plan), world: &World) -> Result<Self> {
-        let rows = world.near().map(|(forest, _)| forest.species.mask_rows);
+        let rows = world.near().filter(|_| plan.z_fields).map(|(forest, _)| forest.species.mask_rows);
         let meshes = world.meshes().filter(|_| plan.shows_meshes());
+        let cards = world.cards().filter(|_| plan.shows_cards());
         Ok(Seen {
             ground: SeenGround::new(gpu, scene, plan)?,
             horizon: Horizon::new(gpu, scene, plan)?,
             meshes: meshes.map(|(_, _, data)| Meshes::new(gpu, scene, plan, data)).transpose()?,
+            cards: cards
+                .map(|(_, cull, (data, _))| Cards::new(gpu, scene, plan, (cull, data)))
+                .transpose()?,
             trees: rows.map(|rows| TreeTiles::new(gpu, scene, plan, rows)).transpose()?,
         })
     }
@@ -135,11 +141,15 @@ impl Canvas {
         let (view, indices, map) = (&world.view, &world.terrain_indices, &world.shadows.map);
         let ground = (&world.terrain, &streamed.draws);
         let forest = world.forest.as_ref().zip(world.shader_map.as_ref());
-        let trees = passes.trees.as_ref().filter(|_| plan.shows_trees()).zip(world.near());
+        let trees = passes.trees.as_ref().filter(|_| plan.shows_z_fields()).zip(world.near());
         let meshes = passes.meshes.as_ref().zip(world.meshes());
+        let cards = passes.cards.as_ref().zip(world.cards());
         passes.ground.see(r, view, indices, ground, &self.targets);
         if let Some((pass, (_, cull, data))) = meshes {
             pass.see(r, view, (cull, data, plan.last_mesh_range), &self.targets);
+        }
+        if let Some((pass, (forest, cull, (data, _)))) = cards {
+            pass.see(r, view, forest, (cull, data), &self.targets);
         }
         if let Some((horizon, far)) = passes.horizon.as_ref().zip(forest) {
             if streamed.far_trees {
@@ -153,8 +163,11 @@ impl Canvas {
         }
         let seen = trees.map(|(tiles, _)| &tiles.seen);
         passes.ground.light(r, view, ground, forest, map, seen, &self.targets);
-        if let Some(((pass, (forest, cull, data)), seen)) = meshes.zip(seen) {
-            pass.light(r, view, forest, (cull, data), map, seen, &self.targets);
+        if let Some((pass, (forest, cull, data))) = meshes {
+            pass.light(r, view, forest, (cull, data, world.sky_of_forest()), map, seen, &self.targets);
+        }
+        if let Some((pass, (forest, cull, (data, sky)))) = cards {
+            pass.light(r, view, forest, (cull, data, sky), map, seen, &self.targets);
         }
         if let Some((tiles, (forest, cull))) = trees {
             tiles.shade(r, view, forest, cull, map, &self.targets);
@@ -181,11 +194,14 @@ impl Canvas {
         reads: &mut ReadBacks,
     ) -> Result<()> {
         let Passes::Tiles(passes) = &self.passes else { return Ok(()) };
-        if let Some(tiles) = passes.trees.as_ref().filter(|_| plan.shows_trees()) {
+        if let Some(tiles) = passes.trees.as_ref().filter(|_| plan.shows_z_fields()) {
             reads.tiles = Some(tiles.read_state(recorder)?);
         }
         if let Some((pass, (_, _, data))) = passes.meshes.as_ref().zip(world.meshes()) {
             reads.meshes = Some(pass.read_kinds(recorder, data)?);
+        }
+        if let Some((pass, (_, _, (data, _)))) = passes.cards.as_ref().zip(world.cards()) {
+            reads.cards = Some(pass.read_kinds(recorder, data)?);
         }
         Ok(())
     }

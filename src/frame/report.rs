@@ -2,7 +2,7 @@
 
 use crate::clock::{process_cpu_ms_since, process_cpu_ns};
 use crate::forest::cull::TreeCounts;
-use crate::gpu::interface::{DrawCommand, MeshKind, TileState, View};
+use crate::gpu::interface::{CardKind, DrawCommand, MeshKind, TileState, View};
 use crate::gpu::{Done, InFlight, Later, Timing};
 
 /// Contents of the caches, by cache.
@@ -77,6 +77,8 @@ pub(super) struct ReadBacks {
     pub tiles: Option<Later<TileState>>,
     /// Species as meshes, with how many trees are such.
     pub meshes: Option<Later<MeshKind>>,
+    /// Species as clouds of cards, with how many trees are such.
+    pub cards: Option<Later<CardKind>>,
     /// Trees in view.
     pub trees: Option<Later<u32>>,
     /// Draws of casters, and the cascade of each of a batch's.
@@ -94,6 +96,9 @@ impl ReadBacks {
         }
         if let Some(draws) = &self.meshes {
             counts.meshes = done.get(draws).iter().map(|k| k.tree_count).sum();
+        }
+        if let Some(draws) = &self.cards {
+            counts.cards = done.get(draws).iter().map(|k| k.tree_count).sum();
         }
         if let Some((commands, cascades)) = &self.casters {
             for (command, cascade) in done.get(commands).iter().zip(cascades.iter().cycle()) {

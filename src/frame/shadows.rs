@@ -128,7 +128,7 @@ impl Shadows {
         let ground = (on && scene.terrain.heights.is_some())
             .then(|| program(ground, &shaders::FRAME_TERRAIN_SHADOW_FRAG, &[]));
         let trees =
-            (on && plan.z_fields).then(|| program(trees, &shaders::FRAME_TREES_ZFIELD_SHADOW_FRAG, &views));
+            (on && plan.near_trees).then(|| program(trees, &shaders::FRAME_TREES_ZFIELD_SHADOW_FRAG, &views));
         let meshes =
             (on && plan.meshes).then(|| program(meshes, &shaders::FRAME_TREES_MESHES_SHADOW_FRAG, &wind));
         let side = SHADOW_CELLS + 1;
@@ -191,7 +191,7 @@ impl Shadows {
         eye: &Eye,
         cascades: &[Cascade],
     ) -> Result<()> {
-        let needed = receivers::needed(tree, eye, cascades, if plan.z_fields { plan.tallest } else { 0.0 });
+        let needed = receivers::needed(tree, eye, cascades, if plan.near_trees { plan.tallest } else { 0.0 });
         let fresh = self.held.take(cascades, &needed);
         let [lowest, highest] = tree.total_range();
         let (mut work, mut sums) = (ShadowWork::default(), Vec::new());

@@ -121,7 +121,7 @@ impl World {
     /// That no tree is to be drawn by itself where the plan has none such.
     fn can_show(&self, scene: &Scene, plan: &Plan, eye: &Eye) -> Result<()> {
         let (extent, heights) = (scene.terrain.extent, self.terrain.tree.total_range());
-        if !plan.z_fields && plan.trees_in_range(extent, heights, eye.position) {
+        if !plan.near_trees && plan.trees_in_range(extent, heights, eye.position) {
             return Err(Error::Usage(format!(
                 "trees are within {:.0} m of this camera, and the plan was made where none are, so it draws none by itself: plan \
                  again for this camera",
@@ -133,6 +133,13 @@ impl World {
                 "trees are within {:.0} m of this camera, where they are meshes, and the plan was made where none are: plan again for \
                  this camera",
                 plan.last_mesh_range
+            )));
+        }
+        if plan.ladder.cards() && !plan.cards && plan.card_in_range(extent, heights, eye.position) {
+            return Err(Error::Usage(format!(
+                "trees are within {:.0} m of this camera, where they are clouds of cards, and the plan was made where none are: plan \
+                 again for this camera",
+                plan.last_card_range
             )));
         }
         if !plan.trees_within(extent, heights, eye.position) {

@@ -7,9 +7,11 @@ use super::shadows::{CastingTrees, Shadows};
 use super::sky::SkyPass;
 use super::trees::shader_map::ShaderMap;
 use crate::bake::Baked;
+use crate::forest::cards::CardData;
 use crate::forest::casters::CasterData;
 use crate::forest::coverage::CoverageData;
 use crate::forest::cull::CullData;
+use crate::forest::forest_sky::ForestSky;
 use crate::forest::indirect::IndirectData;
 use crate::forest::meshes::MeshData;
 use crate::forest::seeds::SeedData;
@@ -46,6 +48,10 @@ pub struct NearTrees {
     pub casters: Option<CasterData>,
     /// What the nearest are drawn from, where those are meshes.
     pub meshes: Option<MeshData>,
+    /// What those are drawn from that are clouds of cards.
+    pub cards: Option<CardData>,
+    /// What the forest leaves of the sky, where harmonics light something.
+    pub sky: Option<ForestSky>,
 }
 
 /// What lives between frames whatever their size.
@@ -81,10 +87,12 @@ impl Forest {
             Ok(NearTrees {
                 cull: CullData::new(gpu, scene, plan, &tables)?,
                 meshes: plan.meshes.then(|| MeshData::new(gpu, scene, plan, baked)).transpose()?,
+                sky: plan.harmonics().then(|| ForestSky::new(gpu, scene, plan, baked)).transpose()?,
+                cards: plan.cards.then(|| CardData::new(gpu, scene, plan, baked)).transpose()?,
                 casters: (plan.cascades > 0).then(|| CasterData::new(gpu, scene, plan)).transpose()?,
             })
         };
-        let near = plan.z_fields.then(near).transpose()?;
+        let near = plan.near_trees.then(near).transpose()?;
         Ok(Forest {
             coverage: CoverageData::new(gpu, scene, plan, &species, &terrain.tree)?,
             seeds: SeedData::new(gpu, scene, plan)?,
@@ -188,6 +196,18 @@ impl World {
         Some((forest, &near.cull, near.meshes.as_ref()?))
     }
 
+    /// The trees that are drawn one by one with what those are drawn from that are clouds of cards.
+    pub fn cards(&self) -> Option<(&Forest, &CullData, (&CardData, &ForestSky))> {
+        let forest = self.forest.as_ref()?;
+        let near = forest.near.as_ref()?;
+        Some((forest, &near.cull, (near.cards.as_ref()?, near.sky.as_ref()?)))
+    }
+
+    /// What the forest leaves of the sky, where harmonics light something.
+    pub fn sky_of_forest(&self) -> Option<&ForestSky> {
+        self.forest.as_ref()?.near.as_ref()?.sky.as_ref()
+    }
+
     /// What finds the trees that cast shadows.
     pub fn casters(&self) -> Option<&CasterData> {
         self.forest.as_ref()?.near.as_ref()?.casters.as_ref()
@@ -199,15 +219,17 @@ impl World {
 /// # Errors
 /// [`Error::Usage`] with what differs, or does not suffice.
 pub(super) fn served(scene: &Scene, held: &Plan, wanted: &Plan) -> Result<Plan> {
-    let same = |a: &Plan, b: &Plan| -> [(&str, bool); 11] {
+    let same = |a: &Plan, b: &Plan| -> [(&str, bool); 13] {
         let grid = |p: &Plan| [p.quad_side, p.tile_side, p.pattern_density, p.plain_side].map(f64::to_bits);
         [
             ("ladder", a.ladder == b.ladder),
             ("rasterizer", a.rasterizer == b.rasterizer),
             ("view mode", a.view_mode == b.view_mode),
             ("samples and layers", (a.samples, a.layers) == (b.samples, b.layers)),
-            ("trees one by one", (a.z_fields, a.transfer_bands) == (b.z_fields, b.transfer_bands)),
+            ("trees one by one", (a.near_trees, a.transfer_bands) == (b.near_trees, b.transfer_bands)),
+            ("z-fields", a.z_fields == b.z_fields),
             ("meshes", a.meshes == b.meshes),
+            ("cards", (a.cards, a.mesh_harmonics) == (b.cards, b.mesh_harmonics)),
             ("tables", a.pair_tables == b.pair_tables),
             ("indirect light", a.indirect == b.indirect),
             ("sun", (a.sun, a.cascades) == (b.sun, b.cascades)),
@@ -242,6 +264,10 @@ pub(super) fn served(scene: &Scene, held: &Plan, wanted: &Plan) -> Result<Plan> 
         species_range: wanted.species_range.clone(),
         mesh_range: wanted.mesh_range.clone(),
         last_mesh_range: wanted.last_mesh_range,
+        card_range: wanted.card_range.clone(),
+        last_card_range: wanted.last_card_range,
+        cloud_range: wanted.cloud_range,
+        far_from: wanted.far_from,
         range: wanted.range,
         silhouette_ratio: wanted.silhouette_ratio,
         draw_limits: wanted.draw_limits,

@@ -165,6 +165,7 @@ pub(super) fn texel_bytes(format: vk::Format) -> Result<usize> {
     Ok(match format {
         vk::Format::R8_UNORM | vk::Format::R8_UINT => 1,
         vk::Format::R8G8B8A8_UNORM
+        | vk::Format::R8G8B8A8_SNORM
         | vk::Format::R8G8B8A8_SRGB
         | vk::Format::R32_UINT
         | vk::Format::R32_SFLOAT

@@ -3,6 +3,7 @@
 pub mod correction;
 pub mod crown;
 pub mod forest;
+pub mod forest_sky;
 pub mod handover;
 pub mod harmonics;
 pub mod hash;

@@ -80,9 +80,12 @@ impl Plan {
         let band = array(resource::TRANSFER, s.transfer_side());
         for species in &scene.species {
             let name = &species.name;
-            let reason = format!("species \"{name}\" is drawn tree by tree");
+            let reason = match self.z_fields {
+                true => format!("species \"{name}\" is drawn tree by tree"),
+                false => format!("trees of species \"{name}\" cast shadows"),
+            };
             items.shared("data", &format!("z-field views of {name}"), reason, vec![views], count);
-            if self.rasterizer == Rasterizer::Tiles {
+            if self.z_fields && self.rasterizer == Rasterizer::Tiles {
                 let reason = format!("tiles look for species \"{name}\" only where it may be seen");
                 items.shared("data", &format!("view outlines of {name}"), reason, vec![outlines], count);
             }
@@ -126,7 +129,7 @@ impl Plan {
         let nodes = described(resource::INDIRECT, texels as u64, NODE_TEXELS);
         let reason = "light that met more than one surface, by density";
         items.add("data", "indirect light", reason, [nodes]);
-        if self.z_fields {
+        if self.near_trees {
             let texels = u64::from(self.tree_capacity) * size_of::<gpu::HandedLight>() as u64 / TREE_TEXELS.1;
             let handed = described(resource::HANDED, texels, TREE_TEXELS);
             let reason = format!("the same of up to {} trees in a frame", self.tree_capacity);
@@ -186,7 +189,7 @@ impl Plan {
         let words = u64::from(gpu::COVER_SCRATCH) * u64::from(self.coverage_size).pow(2);
         let reason = format!("{} coverage tiles are drawn at once", gpu::COVER_SCRATCH);
         items.add("data", "coverage sums", reason, [BufferDesc::new(resource::COVERAGE_SUMS, 4 * words)]);
-        if self.z_fields {
+        if self.near_trees {
             let reason = format!("up to {} trees in a frame", self.tree_capacity);
             items.add("target", "trees and lists", reason, self.tree_buffers());
             if self.cascades > 0 {

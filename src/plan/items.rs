@@ -85,11 +85,17 @@ impl Plan {
     fn listed(&self, scene: &Scene) -> Vec<Item> {
         let mut items = Items::default();
         self.list_ground(scene, &mut items);
-        if self.z_fields {
+        if self.draws_views() {
             self.list_views(scene, &mut items);
         }
         if self.meshes {
             self.list_meshes(scene, &mut items);
+        }
+        if self.cards {
+            self.list_cards(scene, &mut items);
+        }
+        if self.harmonics() {
+            self.list_forest_sky(&mut items);
         }
         if self.wind {
             self.list_wind(scene, &mut items);
@@ -99,7 +105,7 @@ impl Plan {
             self.list_indirect(scene, &mut items);
             self.list_distribution(scene, &mut items);
         }
-        if self.z_fields {
+        if self.near_trees {
             self.list_seeds(&mut items);
         }
         if self.forest {

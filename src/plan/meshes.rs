@@ -20,6 +20,8 @@ const WORDS: (vk::Format, u64) = (vk::Format::R32G32B32A32_UINT, 16);
 const PAIRS: (vk::Format, u64) = (vk::Format::R32G32_SFLOAT, 8);
 /// The same for indices.
 const INDEX: (vk::Format, u64) = (vk::Format::R32_UINT, 4);
+/// 16-byte words of how light comes to a face: nine coefficients of either side, half floats.
+pub const FACE_TRANSFER_WORDS: u64 = 3;
 /// Bytes of a corner: its place and its texture coordinates.
 const CORNER_BYTES: u64 = 16;
 /// Texels along a side of a leaf mask, at most and at least.
@@ -130,13 +132,24 @@ impl Plan {
             self.last_mesh_range
         );
         items.add("data", "meshes", reason, [corners, faces, indices, kinds]);
-        let directions = scene.settings.leaf_directions;
-        let envelopes =
-            words(resource::ENVELOPES, 2 * triangles * 16 * u64::from(envelope_words(directions)));
-        let reason = format!("how thick the crown around each leaf is in {directions} directions");
-        let pairs = u64::from(directions) * u64::from(HIDING_STEPS);
-        let hiding = BufferDesc { texels: Some(PAIRS), ..BufferDesc::new(resource::HIDING, pairs * PAIRS.1) };
-        items.add("data", "leaf envelopes", reason, [envelopes, hiding]);
+        if self.mesh_harmonics {
+            let transfers = words(resource::FACE_TRANSFERS, triangles * 16 * FACE_TRANSFER_WORDS);
+            items.add(
+                "data",
+                "face transfers",
+                "how light comes to each face, as spherical harmonics",
+                [transfers],
+            );
+        } else {
+            let directions = scene.settings.leaf_directions;
+            let envelopes =
+                words(resource::ENVELOPES, 2 * triangles * 16 * u64::from(envelope_words(directions)));
+            let reason = format!("how thick the crown around each leaf is in {directions} directions");
+            let pairs = u64::from(directions) * u64::from(HIDING_STEPS);
+            let hiding =
+                BufferDesc { texels: Some(PAIRS), ..BufferDesc::new(resource::HIDING, pairs * PAIRS.1) };
+            items.add("data", "leaf envelopes", reason, [envelopes, hiding]);
+        }
         let (side, layers) = leaf_masks(scene.species.iter().map(|s| s.mesh.as_ref()));
         if layers > 0 {
             let image = ImageDesc {

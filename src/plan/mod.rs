@@ -1,6 +1,7 @@
 //! What a scene requires: every table, view set, cache, target and pass, with the reason and the bytes, before anything
 //! is allocated. What no one needs is not in the plan, and is not built.
 
+mod cards;
 mod check;
 mod cover;
 mod data;
@@ -21,9 +22,10 @@ use crate::ladder::Ladder;
 use crate::land::pattern::Pattern;
 use crate::scene::{Camera, Scene};
 
+pub use cards::{CARD_DRAWS, TRANSFER_LAYERS};
 pub use data::{NODE_TEXELS, QUAD_INDEX_BYTES, TREE_TEXELS, tables};
 pub use items::Item;
-pub use meshes::envelope_words;
+pub use meshes::{FACE_TRANSFER_WORDS, envelope_words};
 pub use tiles::{Drawing, Rasterizer, TILE_STEPS, TileBuffer, TileBuffers};
 
 /// Storage buffers that every Vulkan device binds, when no device is known.
@@ -101,6 +103,8 @@ pub struct Plan {
     /// Whether any tree stands in the scene.
     pub forest: bool,
     /// Whether trees are drawn one by one: any can come within the range of an eye. Without, the shader-map shows all.
+    pub near_trees: bool,
+    /// Whether some of them are z-fields.
     pub z_fields: bool,
     /// Distance to which trees of each species are their models' meshes, m, times their scale: 0 where none is.
     pub mesh_range: Vec<f64>,
@@ -108,6 +112,18 @@ pub struct Plan {
     pub last_mesh_range: f64,
     /// Whether any tree can come within that of an eye.
     pub meshes: bool,
+    /// Distance to which trees of each species are clouds of cards at most, m, times their scale: 0 where none is.
+    pub card_range: Vec<f64>,
+    /// The same of the largest tree of any, m.
+    pub last_card_range: f64,
+    /// Distance to which any of them is a full cloud, m.
+    pub cloud_range: f64,
+    /// Distance from which on any of them shows its far form, m.
+    pub far_from: f64,
+    /// Whether any tree can come so near an eye that it is a cloud of cards.
+    pub cards: bool,
+    /// Whether meshes are lit by spherical harmonics, as cards are.
+    pub mesh_harmonics: bool,
     /// Largest texel of shadow maps that tell leaves of these apart, m, into which they cast as meshes; 0 where none is a mesh.
     pub mesh_texel: f64,
     /// Whether light meets the average light that the pair tables hold (BN12, G and T): that of a sun, and where it
@@ -238,6 +254,11 @@ impl Plan {
         device: Option<&DeviceInfo>,
     ) -> Result<Self> {
         let ladder = ladder.resolved(&scene.settings);
+        if let Some((what, remedy)) = ladder.contradicts() {
+            return Err(crate::Error::Usage(format!(
+                "ladder {ladder}, as the knobs have it: {what}; {remedy}"
+            )));
+        }
         let mut plan = Plan::empty(scene, eye, layers, ladder, device);
         plan.check_species(scene)?;
         let ground = range::ground_range(scene);
@@ -251,8 +272,10 @@ impl Plan {
                 plan.indirect = scene.settings.table_densities;
             }
             let mut all = std::iter::once(&eye.position).chain(places);
-            plan.z_fields = all.clone().any(|p| plan.scene_in_range(scene, ground, *p));
-            plan.meshes = plan.z_fields && all.any(|p| plan.scene_has_mesh_at(scene, ground, *p));
+            plan.near_trees = all.clone().any(|p| plan.scene_in_range(scene, ground, *p));
+            plan.z_fields = plan.near_trees && ladder.z_fields();
+            plan.meshes = plan.near_trees && all.clone().any(|p| plan.scene_has_mesh_at(scene, ground, *p));
+            plan.cards = plan.near_trees && all.any(|p| plan.scene_has_cards_at(scene, ground, *p));
             if plan.meshes {
                 if ladder.without_meshes().is_some() {
                     meshes::check_size(scene)?;
@@ -262,11 +285,12 @@ impl Plan {
             if plan.z_fields && plan.sun {
                 plan.transfer_bands = scene.settings.transfer_bands;
             }
-            if !plan.z_fields {
+            if !plan.near_trees {
                 (plan.seed_regions, plan.silhouette_quads, plan.shadow_quads) = (0, 0, 0);
                 (plan.tree_capacity, plan.caster_capacity) = (0, 0);
             }
         }
+        plan.check_cards()?;
         plan.choose_rasterizer(rasterizer, device)?;
         plan.list(scene);
         plan.check(scene.settings.memory_mib, device)?;
@@ -293,7 +317,14 @@ impl Plan {
             sun: scene.sun.shines(),
             wind: false,
             forest: false,
+            near_trees: false,
             z_fields: false,
+            card_range: Vec::new(),
+            last_card_range: 0.0,
+            cloud_range: 0.0,
+            far_from: 0.0,
+            cards: false,
+            mesh_harmonics: s.light_model == 1,
             mesh_range: Vec::new(),
             last_mesh_range: 0.0,
             meshes: false,
@@ -334,8 +365,23 @@ impl Plan {
         self.meshes && self.shows_trees()
     }
 
+    /// Whether the picture shows trees that are clouds of cards.
+    pub fn shows_cards(&self) -> bool {
+        self.cards && self.shows_trees()
+    }
+
+    /// Whether the picture shows trees that are z-fields.
+    pub fn shows_z_fields(&self) -> bool {
+        self.z_fields && self.shows_trees()
+    }
+
     /// Whether the picture shows trees that are drawn one by one: in a view mode of the ground they would hide it.
     pub fn shows_trees(&self) -> bool {
-        self.z_fields && self.view_mode != ViewMode::Coverage
+        self.near_trees && self.view_mode != ViewMode::Coverage
+    }
+
+    /// Whether z-field views are drawn, into the picture or into shadow maps.
+    pub fn draws_views(&self) -> bool {
+        self.z_fields || self.near_trees && self.cascades > 0
     }
 }

@@ -28,6 +28,12 @@ pub mod pass {
     pub const MESHES: &str = "meshes";
     /// Light on meshes.
     pub const MESH_LIGHT: &str = "mesh light";
+    /// Which of the trees in view are clouds of cards.
+    pub const CARD_LISTS: &str = "card lists";
+    /// Cards: which of them each sample sees.
+    pub const CARDS: &str = "cards";
+    /// Light on cards.
+    pub const CARD_LIGHT: &str = "card light";
     /// Trees far away, and average light.
     pub const SHADER_MAP: &str = "shader-map";
     /// The ground.
@@ -88,6 +94,12 @@ pub mod pipeline {
     pub const MESHES: &str = "meshes";
     /// Light on meshes.
     pub const MESH_LIGHT: &str = "mesh light";
+    /// Which of the trees in view are clouds of cards.
+    pub const CARD_LISTS: &str = "card lists";
+    /// Cards: which of them each sample sees.
+    pub const CARDS: &str = "cards";
+    /// Light on cards.
+    pub const CARD_LIGHT: &str = "card light";
     /// What of all trees' pipelines sways them.
     pub const SWAY: &str = "sway of trees";
     /// What of meshes' pipelines moves their leaves.
@@ -130,6 +142,8 @@ pub mod resource {
     pub const MESH_FACES: &str = "mesh faces";
     /// Crowns around the leaves of meshes.
     pub const ENVELOPES: &str = "leaf envelopes";
+    /// How light comes to the faces of meshes.
+    pub const FACE_TRANSFERS: &str = "face transfers";
     /// What trees hide of the sky from leaves of neighbours.
     pub const HIDING: &str = "hidden sky";
     /// Where the meshes' materials are holes.
@@ -142,6 +156,20 @@ pub mod resource {
     pub const MESH_DRAWS: &str = "mesh draws";
     /// Trees in view that are meshes.
     pub const MESH_TREES: &str = "mesh trees";
+    /// Cards of all species' clouds.
+    pub const CARDS: &str = "cards";
+    /// Which cards are which species'.
+    pub const CARD_KINDS: &str = "card kinds";
+    /// Draws of the trees that are clouds of cards.
+    pub const CARD_DRAWS: &str = "card draws";
+    /// Opacity of cards.
+    pub const CARD_OPACITIES: &str = "card opacities";
+    /// What is painted on cards.
+    pub const CARD_SURFACES: &str = "card surfaces";
+    /// Light transfer of what is painted on cards.
+    pub const CARD_TRANSFERS: &str = "card transfers";
+    /// What the forest leaves of the sky.
+    pub const FOREST_SKY: &str = "forest sky";
     /// Density maps.
     pub const DENSITY_MAPS: &str = "density maps";
     /// The point pattern.

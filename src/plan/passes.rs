@@ -22,13 +22,18 @@ const MESH_LISTS: &str = "which of the trees in view are near enough to be meshe
 const MESHES: &str = "the triangle of a mesh that each sample sees";
 const MESH_LIGHT: &str = "light on leaves and bark, once a pixel and triangle that it sees";
 
+/// Why there are passes for cards.
+const CARD_LISTS: &str = "how many of the trees in view are clouds of cards";
+const CARDS: &str = "the card that each sample sees";
+const CARD_LIGHT: &str = "light on what is painted on cards, once a pixel and card that it sees";
+
 impl Plan {
     /// What the wind adds: no memory, because what a tree's sway takes is in words that its records have to spare.
     pub(super) fn list_wind(&self, scene: &Scene, items: &mut Items) {
         let Some(wind) = scene.wind else { return };
         let mut add = |name: &str, reason: &str| items.step("pipeline", name, reason);
         let shear = 100.0 * wind.shear();
-        if self.z_fields {
+        if self.near_trees {
             let from =
                 format!("wind of {} m/s: trees lean by up to {shear:.1} % of their height", wind.speed);
             add(pipeline::SWAY, &from);
@@ -67,6 +72,11 @@ impl Plan {
             add(pipeline::MESHES, MESHES);
             add(pipeline::MESH_LIGHT, MESH_LIGHT);
         }
+        if self.cards {
+            add(pipeline::CARD_LISTS, CARD_LISTS);
+            add(pipeline::CARDS, CARDS);
+            add(pipeline::CARD_LIGHT, CARD_LIGHT);
+        }
         if self.z_fields {
             let pipelines = if tiles { &tiles::TREE_PIPELINES[..] } else { &TREE_PIPELINES };
             pipelines.iter().for_each(|(name, reason)| add(name, reason));
@@ -85,18 +95,18 @@ impl Plan {
         if scene.terrain.heights.is_some() {
             add(pass::TERRAIN_TILES, "new quads of terrain");
         }
-        if self.z_fields {
+        if self.near_trees {
             add(pass::SEEDS, "new quads of trees");
         }
         if trees {
             add(pass::COVERAGE, "new quads of terrain with trees");
         }
-        if self.z_fields {
+        if self.near_trees {
             for name in [pass::CULL, pass::SUMS, pass::COMMANDS, pass::COMPACT] {
                 add(name, "which trees are seen, in order");
             }
         }
-        if self.z_fields && self.cascades > 0 {
+        if self.near_trees && self.cascades > 0 {
             add(pass::CASTERS, "which trees cast shadows");
         }
         if self.cascades > 0 {
@@ -119,6 +129,10 @@ impl Plan {
             add(pass::MESH_LISTS, MESH_LISTS);
             add(pass::MESHES, MESHES);
         }
+        if self.cards {
+            add(pass::CARD_LISTS, CARD_LISTS);
+            add(pass::CARDS, CARDS);
+        }
         if self.z_fields && tiles {
             tiles::TREE_PASSES.iter().for_each(|(name, reason)| add(name, reason));
         }
@@ -127,6 +141,9 @@ impl Plan {
         }
         if self.meshes {
             add(pass::MESH_LIGHT, MESH_LIGHT);
+        }
+        if self.cards {
+            add(pass::CARD_LIGHT, CARD_LIGHT);
         }
         if self.z_fields && tiles {
             add(pass::TREE_LIGHT, "light on trees, once a pixel and tree that it sees");

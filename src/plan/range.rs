@@ -18,10 +18,12 @@ impl Plan {
             let sway = scene.wind.map_or(0.0, |w| w.reach(f64::from(reach), f64::from(reach)));
             self.tallest = self.tallest.max((f64::from(reach) + sway) * scale);
         }
+        let mut heights = Vec::new();
         let farthest = self.farthest(scene, std::iter::once(&eye.position).chain(places), ground);
         for species in &scene.species {
             let height = species.mesh.positions.iter().map(|p| p[2]).fold(0.0, f32::max).max(1e-3);
             let range = self.ladder.range(s, f64::from(height) * eye.pixels_at_1m, farthest);
+            heights.push(f64::from(height) * eye.pixels_at_1m);
             self.species_range.push(range);
             let mesh = self.ladder.mesh_range(s, f64::from(height) * eye.pixels_at_1m);
             self.mesh_range.push(mesh);
@@ -41,6 +43,7 @@ impl Plan {
         self.draw_limits = [near, widest / 11.0, converged.max(widest / 11.0)];
         if !self.forest {
             self.range = 0.0;
+            self.card_ranges(scene, &heights);
             return;
         }
         // Level ground has no silhouettes. A shader-map at any distance, and trees at any distance, leave them as they are.
@@ -48,6 +51,7 @@ impl Plan {
             let ratio = self.ladder.least_pixels(s) / f64::from(s.silhouette_min_pixels);
             self.silhouette_ratio = ratio.max(1.0);
         }
+        self.card_ranges(scene, &heights);
     }
 
     /// Shortens the ranges of meshes until the lists hold them all wherever an eye is, where the ladder leaves that to the plan. The factor.
@@ -120,6 +124,11 @@ impl Plan {
         self.trees_within_of(self.last_mesh_range, extent, ground, place)
     }
 
+    /// The same of clouds of cards.
+    pub fn card_in_range(&self, extent: [f64; 2], ground: [f64; 2], place: [f64; 3]) -> bool {
+        self.trees_within_of(self.last_card_range, extent, ground, place)
+    }
+
     /// Whether a tree of a range may be within it from a place.
     fn trees_within_of(&self, range: f64, extent: [f64; 2], ground: [f64; 2], place: [f64; 3]) -> bool {
         let [low, high] = self.trees_box(extent, ground);
@@ -148,6 +157,11 @@ impl Plan {
     /// Whether any tree of a scene may be so near a place that it is its model's mesh.
     pub(super) fn scene_has_mesh_at(&self, scene: &Scene, ground: [f64; 2], place: [f64; 3]) -> bool {
         near_ground(scene, ground, place, |extent, ground| self.mesh_in_range(extent, ground, place))
+    }
+
+    /// Whether any may be a cloud of cards.
+    pub(super) fn scene_has_cards_at(&self, scene: &Scene, ground: [f64; 2], place: [f64; 3]) -> bool {
+        near_ground(scene, ground, place, |extent, ground| self.card_in_range(extent, ground, place))
     }
 }
 

@@ -224,7 +224,8 @@ impl Plan {
         device: Option<&DeviceInfo>,
     ) -> Result<()> {
         self.list_lanes = LIST_LANES[usize::from(device.is_some_and(|d| d.kind != "cpu"))];
-        let beyond = device.and_then(|d| TileBuffers::new(self).beyond(d));
+        let beyond =
+            device.filter(|_| self.z_fields || !self.cards).and_then(|d| TileBuffers::new(self).beyond(d));
         let narrow = device.filter(|d| self.z_fields && d.max_vertex_components < tree_components());
         if let Some(d) = narrow.filter(|_| wanted == Some(Rasterizer::Graphics) || beyond.is_some()) {
             return Err(Error::Usage(format!(
@@ -235,18 +236,23 @@ impl Plan {
                 tree_components()
             )));
         }
-        if self.meshes && wanted == Some(Rasterizer::Graphics) {
-            return Err(Error::Usage(
-                "--rasterizer graphics: trees are meshes near this camera, and those are lit where tiles see them: use --rasterizer \
-                 tiles, or a ladder without mesh"
-                    .into(),
-            ));
+        let near = match (self.meshes, self.cards) {
+            (true, _) => Some(("meshes", "mesh")),
+            (_, true) => Some(("clouds of cards", "cards")),
+            _ => None,
+        };
+        if let Some((what, rung)) = near.filter(|_| wanted == Some(Rasterizer::Graphics)) {
+            return Err(Error::Usage(format!(
+                "--rasterizer graphics: trees are {what} near this camera, and those are lit where tiles see them: use --rasterizer \
+                 tiles, or a ladder without {rung}"
+            )));
         }
         self.rasterizer = match (wanted, beyond) {
-            (None, Some(why)) if self.meshes => {
+            (None, Some(why)) if near.is_some() => {
+                let (what, rung) = near.unwrap_or_default();
                 return Err(Error::Usage(format!(
-                    "trees are meshes near this camera, which takes tiles: {why} on this device: draw fewer trees or a smaller picture, \
-                     or use a ladder without mesh"
+                    "trees are {what} near this camera, which takes tiles: {why} on this device: draw fewer trees or a smaller picture, \
+                     or use a ladder without {rung}"
                 )));
             }
             (Some(Rasterizer::Tiles), Some(why)) => {

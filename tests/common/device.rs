@@ -96,6 +96,11 @@ pub fn bake_meshes(scene: &Scene) -> Vec<Baked> {
     bake_with(scene, Needs { envelopes: true, ..Needs::ALL })
 }
 
+/// The same with what a ladder takes.
+pub fn bake_for(scene: &Scene, ladder: Ladder) -> Vec<Baked> {
+    bake_with(scene, Needs::of([ladder]))
+}
+
 fn bake_with(scene: &Scene, needs: Needs) -> Vec<Baked> {
     let cache = folder().join("bakes");
     load_or_bake_scene(scene, needs, Some(&cache), true).unwrap().into_iter().map(|(b, _)| b).collect()

@@ -4,6 +4,7 @@
 mod device;
 
 mod accumulation;
+mod cards;
 mod casters;
 mod coverage;
 mod cull;

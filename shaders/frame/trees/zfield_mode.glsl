@@ -1,7 +1,9 @@
 // Colours of trees that are drawn one by one in the view modes. Needs frame/view_mode.glsl.
 
-// `draw` is which of the camera's draws the tree is in: magnified, with estimates, without, converged; or MESH_DRAW: it is a mesh.
+// `draw` is which of the camera's draws the tree is in: magnified, with estimates, without, converged; or it is a mesh, a cloud of cards or the far form of one.
 const uint MESH_DRAW = CAMERA_DRAWS;
+const uint CARD_DRAW = CAMERA_DRAWS + 1u;
+const uint FAR_FORM_DRAW = CAMERA_DRAWS + 2u;
 
 vec3 tree_mode(uint draw, uint cascade, float lit) {
     // Normals of the ellipsoid that stands for the crown are no better than none: trees are grey.
@@ -14,6 +16,8 @@ vec3 tree_mode(uint draw, uint cascade, float lit) {
         if (draw == 0u) shown = vec3(0.9, 0.1, 0.1);
         if (draw == 3u) shown = vec3(0.1, 0.7, 0.2);
         if (draw == MESH_DRAW) shown = vec3(0.8, 0.2, 0.8);
+        if (draw == CARD_DRAW) shown = vec3(0.2, 0.35, 0.95);
+        if (draw == FAR_FORM_DRAW) shown = vec3(0.15, 0.75, 0.85);
     }
     if (VIEW_MODE == MODE_CASCADES) shown = cascade_colour(cascade, cascade < MAX_CASCADES ? lit : 1.0);
     return shown;

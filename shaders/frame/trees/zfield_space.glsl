@@ -42,8 +42,10 @@ HandedLight nothing_handed() { return HandedLight(uvec2(0u), uvec2(0u), uvec2(0u
 // Its cascade for shadow lookups, MAX_CASCADES where it is beyond all.
 uint cascade_of(Tree t) { return t.cascade_tint & 0xffu; }
 
-// In how many of a pixel's samples it is its mesh.
-uint mesh_count(Tree t) { return t.cascade_tint >> 8u & 0xffu; }
+// In how many of a pixel's samples it is its mesh; and in how many its mesh or its cloud of cards. Masks of both begin at the same sample, so the
+// cards' are what the second leaves of the first, and the z-field's are the rest.
+uint mesh_count(Tree t) { return t.cascade_tint >> 8u & 15u; }
+uint near_count(Tree t) { return t.cascade_tint >> 12u & 15u; }
 
 // Factor of its colours.
 float tint_of(Tree t) { return unpackHalf2x16(t.cascade_tint).y; }

@@ -7,7 +7,7 @@ use crate::scene::texture::MAX_SIDE;
 use crate::tree::surface::Surface;
 
 /// Empty texels around each picture, so that filters of two levels do not mix neighbours.
-const GUTTER: u32 = 4;
+pub const GUTTER: u32 = 4;
 
 /// One texture of many pictures.
 pub struct Atlas {
@@ -17,32 +17,45 @@ pub struct Atlas {
     places: Vec<[u32; 4]>,
 }
 
-impl Atlas {
-    /// Puts pictures side by side in rows, the highest first; `None` where they do not fit.
-    pub fn new(pictures: &[RgbaImage]) -> Option<Self> {
-        let padded = |p: &RgbaImage| [p.width() + 2 * GUTTER, p.height() + 2 * GUTTER];
-        let area: u64 = pictures.iter().map(|p| padded(p).map(u64::from).iter().product::<u64>()).sum();
-        let widest = pictures.iter().map(|p| padded(p)[0]).max()?;
-        let width = ((area as f64).sqrt().ceil() as u32).max(widest).next_power_of_two();
-        let mut order: Vec<usize> = (0..pictures.len()).collect();
-        order.sort_by_key(|k| std::cmp::Reverse(pictures[*k].height()));
-        let (mut places, mut x, mut y, mut row) = (vec![[0; 4]; pictures.len()], 0, 0, 0);
-        for k in order {
-            let [w, h] = padded(&pictures[k]);
-            if x + w > width {
-                (x, y, row) = (0, y + row, 0);
-            }
-            places[k] = [x + GUTTER, y + GUTTER, pictures[k].width(), pictures[k].height()];
-            (x, row) = (x + w, row.max(h));
+/// Puts rectangles side by side in rows of a width, the highest first: the upper left corner of each, and the height of all.
+pub fn shelves(sizes: &[[u32; 2]], width: u32) -> (Vec<[u32; 2]>, u32) {
+    let mut order: Vec<usize> = (0..sizes.len()).collect();
+    order.sort_by_key(|k| std::cmp::Reverse(sizes[*k][1]));
+    let (mut places, mut x, mut y, mut row) = (vec![[0; 2]; sizes.len()], 0, 0, 0);
+    for k in order {
+        let [w, h] = sizes[k];
+        if x + w > width {
+            (x, y, row) = (0, y + row, 0);
         }
-        let height = y + row;
+        places[k] = [x, y];
+        (x, row) = (x + w, row.max(h));
+    }
+    (places, y + row)
+}
+
+/// The least width for rectangles to be about a square.
+pub fn side(sizes: &[[u32; 2]]) -> u32 {
+    let area: u64 = sizes.iter().map(|s| s.map(u64::from).iter().product::<u64>()).sum();
+    let widest = sizes.iter().map(|s| s[0]).max().unwrap_or(0);
+    ((area as f64).sqrt().ceil() as u32).max(widest)
+}
+
+impl Atlas {
+    /// Of pictures with gutters around them; `None` where they do not fit.
+    pub fn new(pictures: &[RgbaImage]) -> Option<Self> {
+        let sizes: Vec<[u32; 2]> =
+            pictures.iter().map(|p| [p.width() + 2 * GUTTER, p.height() + 2 * GUTTER]).collect();
+        let width = side(&sizes).next_power_of_two();
+        let (corners, height) = shelves(&sizes, width);
         if width > MAX_SIDE || height > MAX_SIDE {
             return None;
         }
         let mut image = RgbaImage::new(width, height);
-        for (picture, place) in pictures.iter().zip(&places) {
-            imageops::replace(&mut image, picture, place[0].into(), place[1].into());
-        }
+        let place = |(picture, [x, y]): (&RgbaImage, [u32; 2])| {
+            imageops::replace(&mut image, picture, (x + GUTTER).into(), (y + GUTTER).into());
+            [x + GUTTER, y + GUTTER, picture.width(), picture.height()]
+        };
+        let places = pictures.iter().zip(corners).map(place).collect();
         Some(Atlas { image, places })
     }
 

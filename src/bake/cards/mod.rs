@@ -1,13 +1,19 @@
 //! Billboard clouds (Behrendt et al. 2005, section 2): a tree as a few dozen textured cards.
 //!
 //! A model's triangles are put together into clusters of near ones, bark and leaves apart; each cluster gets the box of least
-//! volume around it, and one, two or three cards through the box's middle, on which all of the cluster is painted. What comes
-//! out is a model like any other, with one texture of leaves and one of bark.
+//! volume around it, and one, two or three cards through the box's middle, on which all of the cluster is painted.
+//!
+//! [`cloud`] writes that as a model like any other, with one texture of leaves and one of bark; [`CardCloud`] has both sides of each
+//! card with what a renderer needs to light it.
 
+mod artefact;
 mod atlas;
 mod boxes;
 mod cluster;
+pub(super) mod file;
+mod means;
 mod paint;
+mod picture;
 mod verify;
 
 use glam::{Vec2, Vec3};
@@ -16,12 +22,15 @@ use rayon::prelude::*;
 
 use super::surface::Surface;
 use crate::scene::Mesh;
+use crate::settings::Settings;
 use crate::tree::export::{self, Part};
 use crate::{Error, Result};
 use atlas::Atlas;
 use boxes::OrientedBox;
 use cluster::Piece;
+use paint::Painted;
 
+pub use artefact::{CardCloud, CloudCard, FAR};
 pub use verify::{CardQuality, verify};
 
 /// Shares of all clusters that bark has at least and at most: a trunk is little area and much of what one looks at.
@@ -38,20 +47,38 @@ pub struct CardSettings {
     pub flatness: f32,
 }
 
+/// What is asked of a cloud for a renderer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CloudSettings {
+    /// Most cards of the full cloud.
+    pub cards: u32,
+    /// Texels a side of the atlas that all pictures are in, a multiple of 8.
+    pub atlas: u32,
+}
+
+impl From<&Settings> for CloudSettings {
+    fn from(s: &Settings) -> Self {
+        CloudSettings { cards: s.cards, atlas: s.card_atlas }
+    }
+}
+
+/// f of clouds for a renderer, as Behrendt et al. 2005 have it.
+const FLATNESS: f32 = 0.5;
+
 /// A card: a rectangle about its centre, m.
 #[derive(Clone, Debug)]
-pub struct Card {
+struct Card {
     /// Its middle.
-    pub centre: Vec3,
+    centre: Vec3,
     /// From there to the middle of its right edge.
-    pub right: Vec3,
+    right: Vec3,
     /// And of its upper one.
-    pub up: Vec3,
+    up: Vec3,
     /// Faces of the model that are painted on it.
     faces: Vec<u32>,
 }
 
-/// A cloud of cards.
+/// A cloud of cards as a model.
 pub struct Cloud {
     /// Clusters of bark and of leaves.
     pub clusters: [usize; 2],
@@ -65,18 +92,13 @@ pub struct Cloud {
     pub foliage: Vec<String>,
 }
 
-/// Makes a cloud of a model.
+/// Makes a model of a cloud of a model.
 ///
 /// # Errors
 /// [`Error::Usage`] for a model without extent, and where the cards do not fit into a texture.
 pub fn cloud(mesh: &Mesh, settings: CardSettings) -> Result<Cloud> {
     let surface = Surface::new(mesh)?;
-    let of = |leaves: bool| -> Vec<u32> {
-        let is = |f: &u32| mesh.materials[surface.faces[*f as usize].material as usize].foliage == leaves;
-        (0..surface.faces.len() as u32).filter(is).collect()
-    };
-    let parts = [of(false), of(true)];
-    let boxes = clusters_for(&surface, &parts, settings);
+    let boxes = clusters_for(&surface, &parted(mesh, &surface), settings.cards, settings.flatness);
     let texel = 2.0 * surface.frame.half_height / settings.texels as f32;
     let mut out =
         Cloud { clusters: [0; 2], cards: [0; 2], texels: [[0; 2]; 2], glb: Vec::new(), foliage: Vec::new() };
@@ -88,15 +110,9 @@ pub fn cloud(mesh: &Mesh, settings: CardSettings) -> Result<Cloud> {
         if cards.is_empty() {
             continue;
         }
-        let pictures: Vec<RgbaImage> =
-            cards.par_iter().map(|c| paint::paint(mesh, &surface, c, texel)).collect();
-        let atlas = Atlas::new(&pictures).ok_or_else(|| {
-            Error::Usage(format!(
-                "{} cards of {} texels along the tree do not fit into a texture: fewer of either",
-                cards.len(),
-                settings.texels
-            ))
-        })?;
+        let picture = |c| Painted::new(&surface, c, texel).picture(mesh, &surface);
+        let pictures: Vec<RgbaImage> = cards.par_iter().map(picture).collect();
+        let atlas = Atlas::new(&pictures).ok_or_else(|| do_not_fit(cards.len(), settings))?;
         let name = ["bark", "leaf"][k];
         if k == 1 {
             out.foliage.push(name.into());
@@ -109,11 +125,34 @@ pub fn cloud(mesh: &Mesh, settings: CardSettings) -> Result<Cloud> {
     Ok(out)
 }
 
+fn do_not_fit(cards: usize, settings: CardSettings) -> Error {
+    Error::Usage(format!(
+        "{cards} cards of {} texels along the tree do not fit into a texture: fewer of either",
+        settings.texels
+    ))
+}
+
+/// Whether a face is a leaf's, as against bark. Without foliage all stand for leaves, as where trees are meshes.
+fn is_leaf(mesh: &Mesh, surface: &Surface, face: u32) -> bool {
+    let any = mesh.materials.iter().any(|m| m.foliage);
+    !any || mesh.materials[surface.faces[face as usize].material as usize].foliage
+}
+
+/// Faces of bark, and those of leaves.
+fn parted(mesh: &Mesh, surface: &Surface) -> [Vec<u32>; 2] {
+    let of = |leaves: bool| -> Vec<u32> {
+        let is = |f: &u32| is_leaf(mesh, surface, *f) == leaves;
+        (0..surface.faces.len() as u32).filter(is).collect()
+    };
+    [of(false), of(true)]
+}
+
 /// Clusters of bark and of leaves, as many as have no more than so many cards, each with its box.
 fn clusters_for(
     surface: &Surface,
     parts: &[Vec<u32>; 2],
-    settings: CardSettings,
+    most: u32,
+    flatness: f32,
 ) -> [Vec<(OrientedBox, Vec<u32>)>; 2] {
     let pieces =
         parts.each_ref().map(|faces| faces.iter().map(|f| Piece::new(surface, *f)).collect::<Vec<_>>());
@@ -138,16 +177,16 @@ fn clusters_for(
     };
     // How many cards boxes have is known when there are boxes: fewer clusters, until they have no more than are wanted.
     let cards = |all: &[Vec<(OrientedBox, Vec<u32>)>; 2]| -> usize {
-        all.iter().flatten().map(|(b, _)| b.card_count(settings.flatness)).sum()
+        all.iter().flatten().map(|(b, _)| b.card_count(flatness)).sum()
     };
-    let mut count = f64::from(settings.cards);
+    let mut count = f64::from(most);
     let mut found = make(count);
     loop {
         let has = cards(&found);
-        if has <= settings.cards as usize || found.iter().all(|c| c.len() <= 1) {
+        if has <= most as usize || found.iter().all(|c| c.len() <= 1) {
             return found;
         }
-        count *= 0.98 * f64::from(settings.cards) / has as f64;
+        count *= 0.98 * f64::from(most) / has as f64;
         found = make(count);
     }
 }
@@ -157,3 +196,6 @@ fn corners(card: &Card) -> [(Vec3, Vec2); 4] {
     [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
         .map(|(x, y)| (card.centre + card.right * x + card.up * y, Vec2::new(0.5 + 0.5 * x, 0.5 - 0.5 * y)))
 }
+
+#[cfg(test)]
+mod tests;

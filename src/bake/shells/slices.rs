@@ -69,7 +69,7 @@ pub struct Window {
 pub struct Seen {
     /// Height above the ground, in slabs.
     pub height: f32,
-    /// Index of the tree among those painted; [`NONE`] where there is none.
+    /// Index of the tree among those painted; `u32::MAX` where there is none.
     pub tree: u32,
     /// Index of its face.
     pub face: u32,

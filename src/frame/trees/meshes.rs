@@ -1,6 +1,7 @@
 //! Trees that are their models' meshes (BBP08): which they are, which triangle each sample sees, and the light on that.
 
 use crate::forest::cull::CullData;
+use crate::forest::forest_sky::ForestSky;
 use crate::forest::meshes::MeshData;
 use crate::frame::Forest;
 use crate::frame::targets::ImageTargets;
@@ -28,6 +29,8 @@ pub struct Meshes {
     leaf_pixels: f32,
     /// Whether the device takes all draws at once, as many as a shader has counted, and each names its tree.
     counted: bool,
+    /// Whether they are lit by spherical harmonics.
+    harmonics: bool,
 }
 
 impl Meshes {
@@ -60,6 +63,8 @@ impl Meshes {
                     ("LEAF_DIRECTIONS", scene.settings.leaf_directions),
                     ("LEAF_POWER", data.power),
                     ("INDIRECT", u32::from(plan.indirect > 0)),
+                    ("HARMONICS", u32::from(plan.mesh_harmonics)),
+                    ("Z_FIELDS", u32::from(plan.shows_z_fields())),
                     ("WIND", u32::from(plan.wind)),
                     ("VIEW_MODE", plan.view_mode as u32),
                 ],
@@ -68,6 +73,7 @@ impl Meshes {
             size: plan.size,
             leaf_pixels: scene.settings.leaf_pixels,
             counted: gpu.info().counted_draws,
+            harmonics: plan.mesh_harmonics,
         })
     }
 
@@ -123,16 +129,17 @@ impl Meshes {
         });
     }
 
-    /// Records the pass that lights what samples see of them where they see no z-field of `seen`, beside what else their pixels show.
+    /// Records the pass that lights what samples see of them where they see no z-field of `seen`, if there are any, beside what else their pixels
+    /// show.
     #[allow(clippy::too_many_arguments)]
     pub fn light(
         &self,
         recorder: &mut Recorder,
         view: &Buffer,
         forest: &Forest,
-        (cull, data): (&CullData, &MeshData),
+        (cull, data, sky): (&CullData, &MeshData, Option<&ForestSky>),
         shadow_map: &Image,
-        seen: &Buffer,
+        seen: Option<&Buffer>,
         targets: &ImageTargets,
     ) {
         let Some(quads_seen) = &targets.quads else { return };
@@ -149,18 +156,19 @@ impl Meshes {
                 ("envelopes", Resource::Texels(&data.envelopes)),
                 ("rule", Resource::Buffer(&data.rule)),
                 ("hiding", Resource::Texels(&data.hiding)),
+                // Without harmonics nothing of it is read.
+                ("forest_sky", Resource::Texture(sky.map_or(&data.masks, |s| &s.table), Sampler::Linear)),
                 ("optics", Resource::Buffer(&data.optics)),
                 ("handed_light", Resource::Texels(&forest.indirect.handed)),
-                ("seen", Resource::Texels(seen)),
+                // Without z-fields nothing of it is read.
+                ("seen", Resource::Texels(seen.unwrap_or(&cull.trees))),
                 ("shadow_map", Resource::Texture(shadow_map, Sampler::NearestRepeat)),
                 ("depth", Resource::Texture(targets.depth.drawn(), Sampler::Nearest)),
                 ("quads_seen", Resource::Texture(quads_seen.drawn(), Sampler::Nearest)),
             ];
             pass.bind(&self.light, &[&all[..], &shown].concat());
-            pass.push(&MeshLightParameters {
-                size: self.size,
-                heights: [data.top, HIDING_STEPS as f32 / data.top],
-            });
+            let top = sky.filter(|_| self.harmonics).map_or(data.top, |s| s.top);
+            pass.push(&MeshLightParameters { size: self.size, heights: [top, HIDING_STEPS as f32 / top] });
             pass.dispatch([self.tiles[1], self.tiles[0], 1]);
         });
     }

@@ -225,6 +225,18 @@ impl RenderPass<'_, '_> {
         unsafe { r.device().cmd_draw_indirect(r.cmd, commands.handle, offset, 1, 16) };
     }
 
+    /// The same where the word in `count` is 1, on a device with counted draws. Mesa 22.3's llvmpipe counts an indirect draw that has no count of its own by
+    /// the last one that had: behind a counted draw of none it draws none.
+    pub fn draw_indirect_counted(&mut self, (commands, offset): (&Buffer, u64), count: &Buffer) {
+        if self.work.program.is_none() {
+            return;
+        }
+        let r = &mut *self.work.recorder;
+        r.draws += 1;
+        // SAFETY: a program and its resources are bound; the buffers are alive and hold what was put there, and the feature was enabled.
+        unsafe { r.device().cmd_draw_indirect_count(r.cmd, commands.handle, offset, count.handle, 0, 1, 16) };
+    }
+
     /// Draws with 32-bit indices; the arguments are the command at byte `offset` of `commands`.
     pub fn draw_indexed_indirect(&mut self, indices: &Buffer, commands: &Buffer, offset: u64) {
         if self.work.program.is_none() {

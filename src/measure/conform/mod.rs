@@ -136,7 +136,7 @@ pub fn cases() -> Vec<Case> {
     let case = |kind: &str, name: &str, k: Kind| Case { name: format!("{kind}/{name}"), kind: k };
     let scenes = || scenes::ALL.iter().enumerate();
     let mut all: Vec<Case> = scenes().map(|(k, s)| case("image", s.name, Kind::Image(k))).collect();
-    all.extend(scenes().filter(|(_, s)| !s.meshes).map(|(k, s)| case("tiles", s.name, Kind::Tiles(k))));
+    all.extend(scenes().filter(|(_, s)| !s.is_near()).map(|(k, s)| case("tiles", s.name, Kind::Tiles(k))));
     let radiance = scenes().filter(|(_, s)| s.mode == ViewMode::Radiance);
     all.extend(radiance.map(|(k, s)| case("frame", s.name, Kind::Frame(k))));
     all.extend(probe::ALL.iter().enumerate().map(|(k, p)| case("probe", p.0, Kind::Probe(k))));

@@ -31,8 +31,8 @@ pub struct SceneCase {
     wind: f64,
     knobs: &'static [(&'static str, f64)],
     pub mode: ViewMode,
-    /// Whether near trees are their models' meshes, which compute tiles alone draw.
-    pub meshes: bool,
+    /// The ladder, where near trees are meshes or clouds of cards, which compute tiles alone draw; else empty, and that of BN12.
+    near: &'static str,
 }
 
 const PLAIN: &str = "[terrain]\nextent = 1200.0\nalbedo = [0.13, 0.11, 0.08]\n\
@@ -52,10 +52,10 @@ const GROVE: SceneCase = SceneCase {
     wind: 0.0,
     knobs: &[],
     mode: ViewMode::Radiance,
-    meshes: false,
+    near: "",
 };
 /// The same with the nearest trees as meshes.
-const NEAR: SceneCase = SceneCase { name: "near", meshes: true, ..GROVE };
+const NEAR: SceneCase = SceneCase { name: "near", near: NEAR_LADDER, ..GROVE };
 /// Hills a kilometre and more away.
 const HILLS: SceneCase = SceneCase {
     name: "hills",
@@ -71,6 +71,14 @@ const HOTSPOT: SceneCase =
     SceneCase { name: "hotspot", camera: ([550.0, 513.4, 70.0], [600.0, 600.0, 0.0], 40.0), ..GROVE };
 /// Meshes down to trees so small that some in a small picture are.
 const NEAR_LADDER: &str = "mesh:32,zfield,shader-map";
+/// Full clouds and far forms of cards, until the shader-map: small pictures show both, and the fade between them.
+const CARD_LADDER: &str = "cards:8,shader-map";
+/// Every rung.
+const ALL_RUNGS: &str = "mesh:48,cards:24,zfield:6,shader-map";
+/// Small clouds.
+const FEW_CARDS: &[(&str, f64)] = &[("cards", 30.0), ("card_atlas", 256.0), ("cloud_min_pixels", 24.0)];
+/// The same grove by clouds of cards.
+const CARDS: SceneCase = SceneCase { name: "cards", near: CARD_LADDER, knobs: FEW_CARDS, ..GROVE };
 /// The whole forest by the shader-map.
 const FAR: &[(&str, f64)] = &[("zfield_min_pixels", 64.0)];
 
@@ -111,6 +119,25 @@ pub const ALL: &[SceneCase] = &[
     SceneCase { name: "near-all-orders", sun: [45.0, 12.0, 1.0], knobs: &[("indirect", 1.0)], ..NEAR },
     SceneCase { name: "near-windy", wind: 15.0, ..NEAR },
     SceneCase { name: "near-accumulated", knobs: &[("accumulation", 4.0)], ..NEAR },
+    SceneCase { name: "near-harmonics", knobs: &[("light_model", 1.0)], ..NEAR },
+    CARDS,
+    // Upright cards edge-on, of which the level one is left.
+    SceneCase { name: "cards-above", near: CARD_LADDER, knobs: FEW_CARDS, ..ABOVE },
+    SceneCase { name: "cards-inside", camera: ([600.0, 600.0, 3.0], [640.0, 590.0, 6.0], 80.0), ..CARDS },
+    SceneCase { name: "cards-sunset", sun: [120.0, -0.5, 1.0], ..CARDS },
+    SceneCase { name: "cards-windy", wind: 15.0, ..CARDS },
+    SceneCase {
+        name: "cards-all-orders",
+        knobs: &[("cards", 30.0), ("card_atlas", 256.0), ("cloud_min_pixels", 24.0), ("indirect", 1.0)],
+        ..CARDS
+    },
+    SceneCase {
+        name: "cards-one-sample",
+        knobs: &[("cards", 30.0), ("card_atlas", 256.0), ("samples", 1.0)],
+        ..CARDS
+    },
+    SceneCase { name: "all-rungs", near: ALL_RUNGS, ..CARDS },
+    SceneCase { name: "all-rungs-lod", near: ALL_RUNGS, mode: ViewMode::Lod, ..CARDS },
     SceneCase { name: "mode-fractions", mode: ViewMode::Fractions, ..GROVE },
     SceneCase { name: "mode-coverage", mode: ViewMode::Coverage, ..ABOVE },
     SceneCase { name: "mode-lod", mode: ViewMode::Lod, ..HILLS },
@@ -125,9 +152,14 @@ pub fn find(name: &str) -> Result<&'static SceneCase> {
 }
 
 impl SceneCase {
+    /// Whether near trees are meshes or clouds of cards.
+    pub fn is_near(&self) -> bool {
+        !self.near.is_empty()
+    }
+
     /// What finds the samples of its trees: what must hold of a frame must hold of each.
     pub fn rasterizers(&self) -> &'static [Rasterizer] {
-        if self.meshes { &[Rasterizer::Tiles] } else { &RASTERIZERS }
+        if self.is_near() { &[Rasterizer::Tiles] } else { &RASTERIZERS }
     }
 
     /// The scene, with coarse views and small maps so that it is quick to bake and draw, and its camera.
@@ -144,8 +176,8 @@ impl SceneCase {
         );
         let mut scene = scene::parse(&text, Path::new(self.name))?;
         scene.time = TIME;
-        scene.ladder = match self.meshes {
-            true => NEAR_LADDER.parse().map_err(|e| Error::Usage(format!("{}: {e}", self.name)))?,
+        scene.ladder = match self.is_near() {
+            true => self.near.parse().map_err(|e| Error::Usage(format!("{}: {e}", self.name)))?,
             false => Ladder::BN12,
         };
         for (knob, value) in self.knobs {

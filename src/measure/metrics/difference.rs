@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::{
-    Detail, DistanceBin, Estimate, RadianceError, Region, detail, flip_error, over_distance, radiance_error,
-    regions, relative_noise, spread, structural,
+    Detail, DistanceBin, Estimate, RadianceError, Range, Region, detail, flip_error, over_distance,
+    radiance_error, regions, relative_noise, spread, structural,
 };
 use crate::image::Layers;
 use crate::{Error, Result};
@@ -25,6 +25,9 @@ pub struct Difference {
     pub foreground: Option<RadianceError>,
     /// That of the mean radiance of squares of [`AVERAGED`]² pixels: what is left where single leaves do not count.
     pub averaged: Option<RadianceError>,
+    /// The same by the reference's distance; ranges in which nothing is are left out.
+    #[serde(default)]
+    pub ranges: BTreeMap<Range, RadianceError>,
     /// That of single pixels by region of the reference; regions that do not exist are left out.
     pub regions: BTreeMap<Region, RadianceError>,
     /// Mean FLIP of the pictures as displayed.
@@ -59,12 +62,18 @@ pub fn difference(actual: &Layers, reference: &Layers, exposure: f64) -> Result<
     let bins = over_distance(actual, reference);
     let squares = [actual, reference].map(|l| l.averaged(AVERAGED));
     let parts_of_squares = regions(&squares[1]);
+    let seen = |k: usize| parts_of_squares[k] != Region::Background && squares[1].depth[k] > 0.0;
+    let within = |(_, range): (_, Range)| {
+        let counts = |k| seen(k) && Range::of(squares[1].depth[k]) == range;
+        Some((range, radiance_error(&squares[0], &squares[1], counts)?))
+    };
     Ok(Difference {
         not_finite: not_finite as u64,
         reference_noise: relative_noise(reference),
         image: radiance_error(actual, reference, |_| true),
         foreground: radiance_error(actual, reference, |k| all[k] != Region::Background),
         averaged: radiance_error(&squares[0], &squares[1], |k| parts_of_squares[k] != Region::Background),
+        ranges: Range::NAMES.into_iter().filter_map(within).collect(),
         regions: parts.into_iter().filter_map(of).collect(),
         flip: flip_error(actual, reference, exposure),
         ssim: structural(actual, reference, exposure),
@@ -90,6 +99,32 @@ mod tests {
         assert!(d.regions.values().all(|r| (r.bias.value - 0.2).abs() < 1e-6), "{d:?}");
         assert!(d.distance_spread.unwrap() < 1e-6 && d.flip.unwrap().value > 0.0);
         assert!(difference(&a, &texture([40, 60], 1), 1.0).is_err());
+    }
+
+    #[test]
+    fn ranges_are_those_of_the_distance() {
+        let far = |metres: [f32; 3]| {
+            let mut a = texture([60, 40], 1);
+            a.depth = (0..2400).map(|k| metres[k % 60 / 20]).collect();
+            a
+        };
+        let reference = far([20.0, 200.0, 2000.0]);
+        // A third of the columns is half as bright again: all of one range.
+        let mut brighter = reference.clone();
+        for (_, c) in brighter.radiance.iter_mut().enumerate().filter(|(k, _)| k % 60 / 20 == 1) {
+            *c = c.map(|v| 1.5 * v);
+        }
+        let d = difference(&brighter, &reference, 1.0).unwrap();
+        let bias = |range: Range| d.ranges.get(&range).map(|e| e.bias.value);
+        assert!(
+            (bias(Range::Middle).unwrap() - 0.5).abs() < 1e-6 && bias(Range::Near).unwrap().abs() < 1e-6,
+            "{:?}",
+            d.ranges
+        );
+        // The third third is background, and of it only what borders on the rest counts.
+        let far = d.ranges.get(&Range::Far).map_or(0, |e| e.pixels);
+        assert!(2 * far < d.ranges[&Range::Near].pixels, "{:?}", d.ranges);
+        assert_eq!([63.9, 64.0, 512.0].map(Range::of), [Range::Near, Range::Middle, Range::Far]);
     }
 
     #[test]

@@ -17,6 +17,33 @@ pub struct DistanceBin {
     pub ratio: Option<Estimate>,
 }
 
+/// A range of distances along the view axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Range {
+    /// Up to 64 m: where trees are meshes or full clouds of cards in pictures of usual size.
+    Near,
+    /// Up to 512 m: where they are drawn one by one.
+    Middle,
+    /// Beyond: where their average is.
+    Far,
+}
+
+impl Range {
+    /// All, with their names.
+    pub const NAMES: [(&'static str, Range); 3] =
+        [("near", Range::Near), ("middle", Range::Middle), ("far", Range::Far)];
+
+    /// That of a distance, m.
+    pub fn of(metres: f32) -> Self {
+        match metres {
+            m if m < 64.0 => Range::Near,
+            m if m < 512.0 => Range::Middle,
+            _ => Range::Far,
+        }
+    }
+}
+
 /// Ratio of mean radiances in every octave of the reference's distance; background is left out. Noise of the reference
 /// has no part in means but their intervals.
 pub fn over_distance(actual: &Layers, reference: &Layers) -> Vec<DistanceBin> {

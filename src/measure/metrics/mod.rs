@@ -26,7 +26,7 @@ mod ssim;
 
 pub use detail::{Detail, detail};
 pub use difference::{AVERAGED, Difference, difference};
-pub use distance::{DistanceBin, over_distance, spread};
+pub use distance::{DistanceBin, Range, over_distance, spread};
 pub use estimate::{Estimate, block_sums, estimate};
 pub use motion::popping;
 pub use picture::{Flip, display, flip, flip_error, key_exposure, structural};

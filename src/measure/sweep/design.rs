@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::ladder::Ladder;
 use crate::settings::{KNOBS, Knob, PRESETS, Settings};
 use crate::{Error, Result};
 
@@ -18,6 +19,8 @@ pub enum Group {
     Knob,
     /// Several knobs moved from [`HOME`].
     Product,
+    /// A preset with another ladder.
+    Ladder,
 }
 
 /// A setting to measure.
@@ -33,6 +36,8 @@ pub struct Setting {
     pub changed: BTreeMap<String, f64>,
     /// Every knob.
     pub settings: Settings,
+    /// What stands for a tree, where it is not what the sweep's scene says.
+    pub ladder: Option<Ladder>,
 }
 
 /// A knob that is swept.
@@ -98,6 +103,13 @@ pub fn knobs(named: &[String]) -> Result<Vec<Swept>> {
     named.iter().map(find).collect()
 }
 
+/// Those of them that any of some ladders draws by: cards' are for ladders with cards.
+pub fn used_by(knobs: Vec<Swept>, ladders: &[Ladder]) -> Vec<Swept> {
+    let cards = ladders.iter().any(Ladder::cards);
+    let of_cards = |s: &Swept| s.knob.name.starts_with("card") || s.knob.name.starts_with("cloud");
+    knobs.into_iter().filter(|s| cards || !of_cards(s)).collect()
+}
+
 /// Presets, [`HOME`] first; then each knob's values below and above that of each preset, [`HOME`]'s first. `bases` are the
 /// presets as the scene changes them. Settings that are the same as an earlier one are left out.
 ///
@@ -110,7 +122,14 @@ pub fn one_at_a_time(bases: &BTreeMap<String, Settings>, knobs: &[Swept]) -> Res
     for name in order.iter().filter(|n| bases.contains_key(**n)) {
         let group = Group::Preset;
         let (changed, settings) = (BTreeMap::new(), bases[*name].clone());
-        all.push(Setting { name: name.to_string(), base: HOME.into(), group, changed, settings });
+        all.push(Setting {
+            name: name.to_string(),
+            base: HOME.into(),
+            group,
+            changed,
+            settings,
+            ladder: None,
+        });
     }
     for name in order.iter().filter(|n| bases.contains_key(**n)) {
         let base = &bases[*name];
@@ -125,6 +144,24 @@ pub fn one_at_a_time(bases: &BTreeMap<String, Settings>, knobs: &[Swept]) -> Res
         }
     }
     Ok(all)
+}
+
+/// Every preset with each of some ladders.
+pub fn with_ladders(bases: &BTreeMap<String, Settings>, ladders: &[Ladder]) -> Vec<Setting> {
+    let mut all = Vec::new();
+    for ladder in ladders {
+        for preset in PRESETS.iter().filter(|p| bases.contains_key(**p)) {
+            all.push(Setting {
+                name: format!("{preset} {}", ladder.name()),
+                base: HOME.into(),
+                group: Group::Ladder,
+                changed: BTreeMap::new(),
+                settings: bases[*preset].clone(),
+                ladder: Some(*ladder),
+            });
+        }
+    }
+    all
 }
 
 /// Every combination of the values around those of [`HOME`], and these, of several knobs, less what `done` has.
@@ -164,6 +201,7 @@ fn moved(base: &str, settings: &Settings, moves: &[(&str, f64)], group: Group) -
         group,
         changed: BTreeMap::new(),
         settings: settings.clone(),
+        ladder: None,
     };
     for (knob, value) in moves {
         setting.settings.set(knob, *value)?;
@@ -240,6 +278,29 @@ mod tests {
         let names: Vec<&str> = new.iter().map(|s| s.name.as_str()).collect();
         assert_eq!(names, ["balanced cascades=3 view_iterations=1", "balanced cascades=3 view_iterations=3"]);
         assert_eq!(most_accurate(&bases(), &two).unwrap().view_iterations, 4);
+    }
+
+    #[test]
+    fn ladders_are_drawn_at_every_preset() {
+        let two: Vec<Ladder> =
+            ["zfield:4,shader-map", "cards:30,shader-map"].map(|l| l.parse().unwrap()).into();
+        let all = with_ladders(&bases(), &two);
+        let names: Vec<&str> = all.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!(names[..2], ["fast zfield:4,shader-map", "balanced zfield:4,shader-map"]);
+        assert!(names.len() == 6 && all.iter().all(|s| s.base == HOME && s.group == Group::Ladder));
+        assert_eq!((all[5].ladder, &all[5].settings), (Some(two[1]), &bases()["accurate"]));
+    }
+
+    #[test]
+    fn knobs_of_cards_are_for_ladders_with_cards() {
+        let names = |ladder: &str| -> Vec<&str> {
+            let all = used_by(knobs(&[]).unwrap(), &[Ladder::BN12, ladder.parse().unwrap()]);
+            all.iter().map(|s| s.knob.name).collect()
+        };
+        assert!(names("cards:8,shader-map").contains(&"cloud_min_pixels"));
+        let without = names("mesh:64,zfield:4,shader-map");
+        assert!(!without.iter().any(|n| n.starts_with("card") || n.starts_with("cloud")));
+        assert!(without.contains(&"cascades") && without.contains(&"cascade_size"), "{without:?}");
     }
 
     #[test]

@@ -55,6 +55,9 @@ pub struct Identity {
     /// What stands for a tree, near to far, where that is not the usual.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ladder: Option<String>,
+    /// Ladders that are drawn at every preset.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ladders: Vec<String>,
     /// Frames of each camera and setting that are timed, the first of which only warms up.
     pub rounds: u32,
     /// Which device.
@@ -89,6 +92,9 @@ pub struct Point {
     pub group: Group,
     /// Knobs that differ from those of its preset.
     pub changed: BTreeMap<String, f64>,
+    /// What stands for a tree, where it is not what the sweep's scene says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ladder: Option<String>,
     /// Every knob.
     pub settings: Settings,
     /// Why it cannot be drawn; empty if it can. Nothing else was measured then.

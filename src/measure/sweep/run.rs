@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::design::{HOME, Setting, Swept, most_accurate, one_at_a_time, product};
+use super::design::{HOME, Setting, Swept, most_accurate, one_at_a_time, product, with_ladders};
 use super::judge;
 use super::kept::kept_ladder;
 use super::result::{CameraError, Identity, Point, SWEEP_SCHEMA_VERSION, Sample, SweepResult, Time};
 use crate::camera::{Eye, auto_exposure};
 use crate::gpu::{Gpu, Stamps, TimingOptions};
 use crate::image::Layers;
+use crate::ladder::Ladder;
 use crate::measure::bench::{self, Subject};
 use crate::measure::host::Host;
 use crate::measure::metrics::{
@@ -45,6 +46,8 @@ pub struct Request {
     pub presets: BTreeMap<String, Settings>,
     /// Knobs to move.
     pub knobs: Vec<Swept>,
+    /// Ladders to draw at every preset.
+    pub ladders: Vec<Ladder>,
     /// Frames of each camera and setting; the first only warms up.
     pub rounds: u32,
     /// No setting is begun after this.
@@ -87,6 +90,7 @@ pub fn sweep(gpu: &Gpu, request: &Request, folder: &Path, from: &[PathBuf]) -> R
     }
     let mut runner = Runner { gpu, request, finest, images: None, base: None };
     let mut all = one_at_a_time(&request.presets, &request.knobs)?;
+    all.extend(with_ladders(&request.presets, &request.ladders));
     let mut begun = 0;
     // The product can be chosen only when every knob has been moved.
     for part in [false, true] {
@@ -154,6 +158,7 @@ fn empty(gpu: &Gpu, request: &Request, finest: &Settings) -> Result<SweepResult>
         knobs: request.knobs.iter().map(Swept::label).collect(),
         rasterizer: request.rasterizer.map(|r| r.name().into()),
         ladder: kept_ladder(&request.scene.ladder),
+        ladders: request.ladders.iter().map(Ladder::to_string).collect(),
         rounds: request.rounds,
         device: gpu.info().into(),
         cpu: (host.cpu.clone(), host.threads),
@@ -188,8 +193,9 @@ struct Runner<'a> {
 }
 
 impl Runner<'_> {
-    fn scene(&self, settings: &Settings) -> Scene {
-        Scene { settings: settings.clone(), ..self.request.scene.clone() }
+    fn scene(&self, settings: &Settings, ladder: Option<Ladder>) -> Scene {
+        let scene = self.request.scene.clone();
+        Scene { settings: settings.clone(), ladder: ladder.unwrap_or(scene.ladder), ..scene }
     }
 
     /// Measures a setting. One that the plan refuses is a point too.
@@ -199,6 +205,7 @@ impl Runner<'_> {
             base: setting.base.clone(),
             group: setting.group,
             changed: setting.changed.clone(),
+            ladder: setting.ladder.map(|l| l.to_string()),
             settings: setting.settings.clone(),
             refused: String::new(),
             time: None,
@@ -230,15 +237,15 @@ impl Runner<'_> {
         };
         let own_base = setting.name == setting.base;
         let kept = self.base.take().filter(|(name, _)| *name == setting.base && !own_base);
-        let build = |settings: &Settings| {
-            let scene = self.scene(settings);
+        let build = |settings: &Settings, ladder| {
+            let scene = self.scene(settings, ladder);
             let plan = bench::plan(&scene, &views, self.request.size, self.request.rasterizer, self.gpu)?;
             Subject::new(self.gpu, scene, plan, self.request.cache.as_deref(), self.request.quiet)
         };
         let mut base = match kept {
             Some((_, subject)) => Some(subject),
             None if own_base => None,
-            None => Some(build(&self.request.presets[&setting.base])?),
+            None => Some(build(&self.request.presets[&setting.base], None)?),
         };
         if let Some(base) = &mut base {
             // What was dropped is freed with the next frame, and not to be counted for this setting.
@@ -246,7 +253,7 @@ impl Runner<'_> {
         }
         let bytes = || self.gpu.memory_report().iter().map(|(_, bytes)| bytes).sum::<u64>();
         let before = bytes();
-        let own = build(&setting.settings)?;
+        let own = build(&setting.settings, setting.ladder)?;
         let mut subjects: Vec<Subject> = base.into_iter().chain([own]).collect();
         let results = bench::run(self.gpu, &mut subjects, &request, true)?;
         point.allocated_bytes = bytes().saturating_sub(before);
@@ -260,8 +267,8 @@ impl Runner<'_> {
     }
 
     /// Draws a camera's image, and one a little nearer to its target.
-    fn shot(&self, settings: &Settings, camera: &Camera) -> Result<Shot> {
-        let scene = self.scene(settings);
+    fn shot(&self, (settings, ladder): (&Settings, Option<Ladder>), camera: &Camera) -> Result<Shot> {
+        let scene = self.scene(settings, ladder);
         let mut nearer = camera.clone();
         for (p, t) in nearer.position.iter_mut().zip(camera.target) {
             *p += MOVE * (t - *p);
@@ -291,10 +298,11 @@ impl Runner<'_> {
         let exposure = auto_exposure(&request.scene);
         // One device's memory: the preset's renderer makes room.
         let shots: Result<Vec<Shot>> =
-            request.cameras.iter().map(|c| self.shot(&setting.settings, c)).collect();
+            request.cameras.iter().map(|c| self.shot((&setting.settings, setting.ladder), c)).collect();
         let shots = shots?;
         if self.images.is_none() {
-            let all: Result<Vec<Shot>> = request.cameras.iter().map(|c| self.shot(&self.finest, c)).collect();
+            let all: Result<Vec<Shot>> =
+                request.cameras.iter().map(|c| self.shot((&self.finest, None), c)).collect();
             self.images = Some(all.map_err(|e| match e {
                 Error::Usage(why) => Error::Usage(format!(
                     "the most accurate setting cannot be drawn: {why}\n  remedy: sweep fewer knobs (--knobs), or smaller"

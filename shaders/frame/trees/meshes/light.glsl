@@ -1,9 +1,12 @@
-// Light on meshes where samples see them, once a pixel and triangle (BBP08, section 4). One workgroup a tile of 8 x 8 pixels, as for
-// z-fields: every invocation lists what its column of pixels sees; all light the list in turn; each puts its pixels together.
+// Light on meshes where samples see them, once a pixel and triangle: by the crown around its leaf (BBP08, section 4), or by the spherical harmonics of
+// how light comes to it (BCF05, section 4).
 #include "physics/hash.glsl"
 #include "physics/light.glsl"
 #include "physics/shadow.glsl"
 #include "physics/leaf.glsl"
+#include "physics/harmonics.glsl"
+#include "physics/forest_sky.glsl"
+#include "physics/received.glsl"
 #include "physics/indirect.glsl"
 #include "forest/wind.glsl"
 #include "frame/trees/zfield_space.glsl"
@@ -16,7 +19,6 @@
 #include "frame/shown.glsl"
 #include "frame/tile.glsl"
 
-layout(local_size_x = 8) in;
 layout(std140, binding = 0) uniform ViewBuffer { View v; } view;
 layout(binding = 1) uniform usamplerBuffer trees;
 layout(std140, binding = 2) uniform SpeciesTable { Species items[MAX_SPECIES]; } species;
@@ -24,19 +26,20 @@ layout(std430, binding = 3) readonly buffer Kinds { MeshKind items[]; } kinds;
 layout(std430, binding = 4) readonly buffer MeshTrees { MeshTree items[]; } mesh_trees;
 layout(binding = 5) uniform usamplerBuffer corners;
 layout(binding = 6) uniform usamplerBuffer faces;
-layout(binding = 7) uniform usamplerBuffer seen;      // z-field trees, which are before what meshes show
 layout(binding = 8) uniform usamplerBuffer envelopes;
 layout(std140, binding = 9) uniform Leaves { vec4 items[2u * 26u]; } rule;
 layout(std140, binding = 12) uniform Optics { vec4 items[3u * MAX_SPECIES]; } optics; // of each species: reflectance and transmittance of leaves, bark
-layout(binding = 13) uniform sampler2DArray shadow_map;
 layout(binding = 15) uniform usamplerBuffer handed_light;
 layout(binding = 14) uniform samplerBuffer hiding;    // of each direction, HIDING_STEPS pairs
 layout(push_constant) uniform Push { MeshLightParameters p; };
-layout(constant_id = 0) const uint SAMPLES = 4u;
 layout(constant_id = 1) const bool HAS_SUN = true;
 layout(constant_id = 2) const uint LEAF_DIRECTIONS = 26u;
 layout(constant_id = 3) const int LEAF_POWER = 6;
 layout(constant_id = 4) const bool INDIRECT = false;
+layout(constant_id = 6) const bool HARMONICS = false;
+layout(binding = 16) uniform sampler2DArray forest_sky; // zonal harmonics of what a forest leaves of the sky, by height and thickness
+
+#include "frame/trees/near_sun.glsl"
 
 // What the crown leaves of sky and sun at a triangle of unit normal n, all in the tree's own axes; and of the sky, what the trees around leave
 // of thickness `around`, at a height above the ground in metres (src/bake/hiding.rs).
@@ -60,24 +63,20 @@ LeafLight leaf_light(uint face, vec3 n, vec3 viewer, vec3 sun, float height, flo
     return leaf_means(light, sides, towards, n);
 }
 
-// What is left of the sun at a place of unit normal n, of which `own` is what its own crown leaves on average. Each tree's shadow counts once:
-// a cascade into which meshes cast tells single leaves apart, and knows its own tree's as well; another knows the other trees, by their
-// z-fields, and the envelope is the own tree's shadow.
-float sun_left(Tree t, Species kind, vec3 world, vec3 n, float own) {
-    View v = view.v;
-    uint cascade = min(cascade_of(t), MAX_CASCADES - 1u);
-    vec2 turn;
-    mat4 shadow = cascade_matrix(v, cascade, turn);
-    vec3 at = (shadow * vec4(world, 1.0)).xyz;
-    float deeper = (shadow * vec4(v.sun_direction, 0.0)).z;
-    // Half a texel towards the sun, so that nothing shades itself.
-    at.z += 0.5 * v.cascade_texel[cascade] * deeper;
-    bool leaves = cascade_of(t) < v.mesh_cascades;
-    float reach = 4.0 * kind.scale_to_metres.z * t.scale * deeper;
-    vec3 facing = dot(n, v.sun_direction) < 0.0 ? -n : n;
-    vec2 gradient = leaves ? plane_gradient(facing, v.cascade_x, v.cascade_y, v.sun_direction) : vec2(0.0);
-    float visible = sun_visibility(shadow_map, at, gradient, turn, cascade, leaves ? ON_MESH : caster_name(t.identity), leaves ? 0.0 : reach);
-    return (leaves ? 1.0 : own) * (cascade_of(t) < MAX_CASCADES ? visible : 1.0);
+// What a triangle receives; `front` says whether the side of its normal is seen.
+Received face_received(uint face, bool front, vec3 sun, vec3 zonal) {
+    float c[24];
+    for (int word = 0; word < 3; word++) {
+        uvec4 w = texelFetch(envelopes, 3 * int(face) + word);
+        for (int k = 0; k < 4; k++) {
+            vec2 pair = unpackHalf2x16(w[k]);
+            c[8 * word + 2 * k] = pair.x;
+            c[8 * word + 2 * k + 1] = pair.y;
+        }
+    }
+    Received r = received(float[](c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8]),
+                          float[](c[9], c[10], c[11], c[12], c[13], c[14], c[15], c[16], c[17]), sun, zonal);
+    return front ? r : Received(r.sun.yx, r.sky.yx);
 }
 
 // What a triangle shows to a pixel, at a place of the world from the camera.
@@ -101,6 +100,7 @@ Shown shade(uint what, vec3 world) {
     }
     vec3 n = normalize(cross(b - a, c - a));
     bool leaf = is_leaf(is);
+    bool front = !leaf || dot(n, viewer) >= 0.0;
     // Bark has one side, that which is seen.
     if (!leaf && dot(n, viewer) < 0.0) n = -n;
     vec3 reflectance = optics.items[3u * row + (leaf ? 0u : 2u)].rgb, transmittance = leaf ? optics.items[3u * row + 1u].rgb : vec3(0.0);
@@ -108,15 +108,29 @@ Shown shade(uint what, vec3 world) {
     float above_middle = (back * (world - t.centre)).z, height = above_middle / (kind.scale_to_metres.z * t.scale);
     HandedLight handed = nothing_handed();
     if (INDIRECT) handed = fetch_handed(handed_light, index);
-    LeafLight light = leaf_light(face, n, viewer, sun, above_middle + kind.centre * t.scale, hole.x / max(kind.hole, 1e-9) * kind.mean_area);
-    vec3 sky = tint_of(t) * view.v.sky_radiance;
-    vec3 sky_part = own.x * leaf_sky(reflectance, transmittance, n, viewer, light.sky) * sky + t.mean_sky;
-    vec3 sun_part = t.mean_sun;
+    float above = above_middle + kind.centre * t.scale, around = hole.x / max(kind.hole, 1e-9) * kind.mean_area;
+    vec3 sky = tint_of(t) * view.v.sky_radiance, sky_seen, sun_seen;
+    float own_part = 1.0;
+    if (HARMONICS) {
+        vec3 zonal = textureLod(forest_sky, vec3(sky_place(above / p.heights.x, around), 0.0), 0.0).xyz;
+        Received light = face_received(face, front, sun, zonal);
+        sky_seen = (reflectance * light.sky.x + transmittance * light.sky.y) / PI;
+        sun_seen = (reflectance * light.sun.x + transmittance * light.sun.y) / PI;
+    } else {
+        LeafLight light = leaf_light(face, n, viewer, sun, above, around);
+        sky_seen = leaf_sky(reflectance, transmittance, n, viewer, light.sky);
+        sun_seen = leaf_sun(reflectance, transmittance, n, viewer, sun);
+        own_part = light.sun;
+    }
+    vec3 sky_part = own.x * sky_seen * sky + t.mean_sky, sun_part = t.mean_sun;
     float lit_part = 0.0;
     if (HAS_SUN) {
-        float visible = sun_left(t, kind, world, rotated(t.turn, n), light.sun);
+        // A cascade into which meshes cast tells single leaves apart, and knows the own tree's as well; another knows the other trees, by
+        // their z-fields, and the envelope is the own tree's shadow. Harmonics have it always.
+        bool leaves = !HARMONICS && cascade_of(t) < v.mesh_cascades;
+        float visible = sun_left(t, kind, world, rotated(t.turn, n), own_part, leaves);
         lit_part = min(own.x * visible + lit.x, 1.0);
-        sun_part += (own.x * visible * tint_of(t)) * leaf_sun(reflectance, transmittance, n, viewer, sun) * v.sun_irradiance;
+        sun_part += (own.x * visible * tint_of(t)) * sun_seen * v.sun_irradiance;
     }
     if (INDIRECT) {
         vec3 of_leaves = leaf ? vec3(1.0) : kind.bark_ratio;
@@ -131,59 +145,9 @@ Shown shade(uint what, vec3 world) {
 #endif
 }
 
-uint sample_sees(ivec2 pixel, int k) {
-    uint tree = texelFetch(seen, int((pixel.y * int(p.size.x) + pixel.x) * int(SAMPLES)) + k).x;
-    uint what = surface_seen(pixel, k);
-    return tree == 0u && is_mesh(what) ? what : 0u;
-}
+bool is_mine(uint what) { return is_mesh(what); }
+// The ground's light is there before.
+bool is_stored(uint what) { return is_ground(what); }
+uint tree_seen(uint what) { return mesh_trees.items[seen_tree(what)].tree; }
 
-// Whether a sample of a pixel sees the ground or the sky, so that something is there already.
-bool sees_past(ivec2 pixel) {
-    bool past = false;
-    for (uint k = 0u; k < SAMPLES; k++) {
-        uint tree = texelFetch(seen, int((pixel.y * int(p.size.x) + pixel.x) * int(SAMPLES) + int(k))).x;
-        past = past || (tree == 0u && !is_mesh(surface_seen(pixel, int(k))));
-    }
-    return past;
-}
-
-#include "frame/trees/distinct.glsl"
-
-// The mean place of samples of a pixel.
-vec3 place_of(ivec2 pixel, uint samples) {
-    Camera camera = camera_of(view.v, vec2(p.size));
-    vec3 sum = vec3(0.0);
-    for (uint k = 0u; k < SAMPLES; k++) {
-        vec2 offset = vec2(pixel) + 0.5 + sample_offset(k, SAMPLES) - 0.5 * vec2(p.size);
-        float deep = view.v.clip_from_world[3].z / max(surface_depth(pixel, int(k)), 1e-30);
-        sum += (samples >> k & 1u) != 0u ? deep * ray_through(camera, offset) : vec3(0.0);
-    }
-    return sum / float(bitCount(samples));
-}
-
-void main() {
-    uvec2 corner = tile_corner();
-    uint column = gl_LocalInvocationIndex;
-    list_items(corner, column);
-    barrier();
-    uint total = item_count();
-    for (uint i = column; i < total; i += 8u) {
-        uint slot = item_slot(i, MOST_ITEMS);
-        shown[slot] = shade(ranks[slot], place_of(item_pixel(corner, slot), places[slot] & 0xffu));
-    }
-    barrier();
-    uint item = column * MOST_ITEMS, end = item + counts[column];
-    for (uint row = 0u; row < TILE_SIDE; row++) {
-        uint covered, first;
-        Shown all = row_shown(row, end, item, covered, first);
-        ivec2 pixel = ivec2(corner + uvec2(column, row));
-        if (covered != 0u && sees_past(pixel)) all = sum(all, load_pixel(pixel));
-        if (covered != 0u) store_pixel(pixel, all);
-#ifdef LAYERS
-        if (first != ~0u) {
-            uint kind = species_row(texelFetch(trees, int(mesh_trees.items[seen_tree(ranks[first])].tree) * 8 + 1).z);
-            store_first(pixel, kind + 1u, surface_depth(pixel, 0));
-        }
-#endif
-    }
-}
+#include "frame/trees/near_pixels.glsl"

@@ -27,7 +27,7 @@ shared uint end_of_all;
 // The species of the tree at a place of the lists; MAX_SPECIES where it is no mesh.
 uint species_at(uint place, uint end) {
     int at = int(lists.items[min(place, max(end, 1u) - 1u)]) * 8;
-    uint species = texelFetch(trees, at + 1).z & TREE_SPECIES, samples = texelFetch(trees, at + 5).w >> 8u & 0xffu;
+    uint species = texelFetch(trees, at + 1).z & TREE_SPECIES, samples = texelFetch(trees, at + 5).w >> 8u & 15u;
     return place < end && samples > 0u ? species : MAX_SPECIES;
 }
 

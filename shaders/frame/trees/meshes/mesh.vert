@@ -6,7 +6,7 @@
 #include "physics/masks.glsl"
 #include "forest/wind.glsl"
 #include "frame/trees/zfield_space.glsl"
-#include "frame/trees/meshes/seen.glsl"
+#include "frame/trees/near_seen.glsl"
 #include "frame/trees/meshes/corner.glsl"
 #include "physics/levels.glsl"
 #include "frame/trees/meshes/level.glsl"

@@ -80,7 +80,7 @@ void main() {
     s.across = vec4(0.0);
     s.start = at;
     s.depth = deepest;
-    s.mesh = mesh_count(t);
+    s.mesh = near_count(t);
     if (deepest > 0.0 && t.fade > 0.0 && s.mesh < SAMPLES) {
         vec3 point = t.centre + (at == vec2(0.0) ? vec3(0.0) : world_from_tree(t, kind, plane.right * at.x + plane.up * at.y) - t.centre);
         vec3 ray = point / deepest;
