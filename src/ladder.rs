@@ -181,13 +181,8 @@ impl Ladder {
         }
     }
 
-    /// What is wrong with heights, and the remedy, where they do not grow smaller from rung to rung: knobs may say some.
-    pub fn contradicts(&self) -> Option<(String, String)> {
-        self.descends().err()
-    }
-
     /// That heights written down grow smaller from rung to rung, or what is wrong and the remedy.
-    fn descends(&self) -> Result<(), (String, String)> {
+    pub fn descends(&self) -> Result<(), (String, String)> {
         let written: Vec<f64> = self.steps.iter().flatten().filter_map(|s| s.pixels).collect();
         match written.iter().zip(written.iter().skip(1)).find(|(near, far)| near <= far) {
             Some((near, far)) => {
@@ -424,8 +419,8 @@ mod tests {
         // What is written may contradict what knobs say.
         let both: Ladder = "mesh:20,cards,shader-map".parse().unwrap();
         assert!(
-            both.contradicts().is_none()
-                && both.resolved(&settings).contradicts().unwrap().0.contains("30 pixels behind 20")
+            both.descends().is_ok()
+                && both.resolved(&settings).descends().unwrap_err().0.contains("30 pixels behind 20")
         );
         assert_eq!(Ladder::SHADER_MAP.range(&settings, 1000.0, 3000.0), 0.0);
         let near: Ladder = "mesh:200,zfield,shader-map".parse().unwrap();

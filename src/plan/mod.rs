@@ -254,7 +254,7 @@ impl Plan {
         device: Option<&DeviceInfo>,
     ) -> Result<Self> {
         let ladder = ladder.resolved(&scene.settings);
-        if let Some((what, remedy)) = ladder.contradicts() {
+        if let Err((what, remedy)) = ladder.descends() {
             return Err(crate::Error::Usage(format!(
                 "ladder {ladder}, as the knobs have it: {what}; {remedy}"
             )));

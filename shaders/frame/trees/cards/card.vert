@@ -29,7 +29,7 @@ const vec2 CORNERS[6] = vec2[](vec2(-1.0, -1.0), vec2(1.0, -1.0), vec2(1.0, 1.0)
 
 void main() {
     bool far_form = p.far_form != 0u;
-    uint first = far_form && p.far_bins > 0u ? (p.far_bins < DISTANCE_BINS ? starts.items[1u + p.far_bins] : 0u) : 0u;
+    uint first = far_form && p.far_bins < DISTANCE_BINS ? starts.items[1u + p.far_bins] : 0u;
     uint tree = lists.items[first + uint(gl_InstanceIndex)];
     Tree t = fetch_tree(trees, tree);
     uint row = species_row(t.species);

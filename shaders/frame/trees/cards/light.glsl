@@ -69,7 +69,7 @@ Shown shade(uint what, vec3 world) {
     float level = clamp(floor(log2(max(texels, 1e-6)) + 0.5), 0.0, float(CARD_LEVELS - 1u));
     vec4 surface = textureLod(surfaces, vec3(texel / vec2(textureSize(surfaces, 0).xy), float(row)), level);
     // Where what is painted there was, before the card.
-    vec3 moved = (behind ? -toward : toward) * ((2.0 * surface.y - 1.0) * c.depth), found = c.centre + place + moved;
+    vec3 out_of = behind ? -toward : toward, moved = out_of * ((2.0 * surface.y - 1.0) * c.depth), found = c.centre + place + moved;
     world += rotated(t.turn, moved * t.scale);
     float height = found.z / kind.scale_to_metres.z, share = surface.x;
     vec2 hole = unpackHalf2x16(t.hole_change), own = unpackHalf2x16(t.own_lit), lit = unpackHalf2x16(t.mean_lit_change);
@@ -78,7 +78,7 @@ Shown shade(uint what, vec3 world) {
     mat3 back = tree_rotation(t);
     Received light = card_received(texel, row, back * v.sun_direction, zonal);
     // A leaf that the card shows from one side shows the other to who looks at the card askew.
-    vec3 n = painted_normal(surface.zw), out_of = behind ? -toward : toward;
+    vec3 n = painted_normal(surface.zw);
     n = normalize(c.right) * n.x + normalize(c.up) * n.y + out_of * n.z;
     if (share > 0.5 && dot(n, resting(t, -world)) < 0.0) light = Received(light.sun.yx, light.sky.yx);
     vec3 reflectance = mix(optics.items[3u * row + 2u].rgb, optics.items[3u * row].rgb, share) / PI;
