@@ -10,6 +10,7 @@ const uint SHADOW_PAGES = 64u;        // pages along a side of a shadow cascade:
 const float SHADOW_DEPTHS = 16.0;     // depth range of a cascade over its width
 const uint SHADOW_CELLS = 8u;         // mesh cells along a side of a square of ground that casts
 const uint TERRAIN_CELLS = 32u;       // mesh cells along a side of a terrain quad
+const uint SHELL_CELLS = 8u;          // mesh cells along a side of a slice of forest over a terrain quad
 const uint TERRAIN_HEIGHTS = 33u;     // height samples along a side of a terrain tile
 const uint FOREST_NODES = 17u;        // shader-map nodes along a side of a terrain quad: every second vertex
 const uint TERRAIN_SLOPES = 65u;      // slope samples along a side of a terrain tile
@@ -28,12 +29,14 @@ const uint HIDING_STEPS = 16u;        // steps of height above the ground for wh
 const uint TREE_SPECIES = 15u;        // of a tree's word of species: its index; the rest is its sway in the wind (physics/wind.glsl), in its own axes
 const uint MESH_SEEN = 0x80000000u;   // of what a sample sees: a mesh's tree << 19 | triangle, not a quad of the ground
 const uint CARD_SEEN = 0x40000000u;   // of what a sample sees, where it is no mesh: a tree << 9 | card of its cloud
+const uint SHELL_SEEN = 0x20000000u;  // of what a sample sees, where it is neither: a quad of the ground << 6 | slice over it
 const uint CARD_TREES = 2097152u;     // most trees in view, where some are clouds of cards: 21 bits of it
 const uint MOST_CARDS = 512u;         // most cards of a cloud with its far form: 9 bits of it
 const uint FAR_CARDS = 3u;            // cards of the far form of a cloud
 const uint CARD_LEVELS = 4u;          // levels of detail of pictures of cards
 const uint SKY_STEPS = 16u;           // steps of the height, and of the thickness of crowns around, for which the sky of a forest is known
 const float TRANSFER_SCALE = 1.024;    // of coefficients of light transfer as they are stored, -1 to 1
+const float FREE_SCALE = 7.0344262;       // of coefficients of what other trees leave of a direction, as shells store them, -1 to 1
 const uint LEAF_OCTAVES = 7u;         // shares of the leaves at which the pull on their cards is known: 1, 1/2, 1/4 and so on
 const float LEAST_SHARE = 0.015625;   // the last of them
 const float FADE_BAND = 0.1;          // half the width of the band of ranks in which cards fade, over u (1 - u)
@@ -70,6 +73,8 @@ struct View {
     ivec2 grid_camera;                // camera's cell of the terrain's finest grid
     vec2 grid_offset;                 // camera's position in that cell, m
     vec2 quad_offset;                 // camera's position in that quad, m
+    ivec2 wang_camera;                // Wang tile that the camera is over
+    vec2 wang_offset;                 // camera's position in it, in tile sides
     vec2 shift;                       // by which the picture is shifted, in clip space: its pixels are means of frames with several shifts
     uint dither_turn;                 // what such a frame adds to the dithers of trees, 2^-32
     uint frames_before;               // such frames of the same picture
@@ -304,6 +309,29 @@ struct CardParameters {
     uint cloud_cards;                 // of the largest full cloud
     float fade_pixels;                // apparent height of a tree from which on its full cloud gives way to the far form
     uint far_form;                    // 1: what is drawn is the far form
+};
+
+// Shell textures of the scene's forest. Bound as a uniform block.
+struct ShellTable {
+    vec4 shares[3];                   // of what channels of coverage tiles are: the share of the full density of trees, a unit
+    vec4 nearness[3];                 // and 1 over the range of single trees of that species, 1/m; 0 where none is drawn by itself
+    vec3 reflectance;                 // largest, that texels of 1 have
+    float height;                     // of the stack, m
+    vec3 transmittance;               // largest
+    float tile_side;                  // of a Wang tile, m
+    float begin;                      // distance from which on some trees are slices, m
+    float spread;                     // apparent height of a slice under which slices merge, pixels
+    uint slices;                      // of the finest stack
+    uint texels;                      // along a side of a tile
+    uint seed;                        // of the scene
+    uint species_count;               // of the scene
+};
+
+// What lighting shells takes.
+struct ShellLightParameters {
+    uvec2 size;                       // of the image, pixels
+    float step;                       // metres a finest grid step of the terrain
+    float larger;                     // log2 of how much larger texels of light are than those of cover
 };
 
 // What lighting cards takes.

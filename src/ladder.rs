@@ -25,10 +25,12 @@ pub enum Rung {
     ZField,
     /// A shader of the ground, for all trees together (BN12, section 6).
     ShaderMap,
+    /// Slices of the forest over the ground, for all trees together (BCF05, section 3).
+    Shells,
 }
 
 /// Number of rungs.
-const RUNGS: usize = 4;
+const RUNGS: usize = 5;
 
 impl Rung {
     /// All, near to far, with the names that users write.
@@ -37,7 +39,13 @@ impl Rung {
         ("cards", Rung::Cards),
         ("zfield", Rung::ZField),
         ("shader-map", Rung::ShaderMap),
+        ("shells", Rung::Shells),
     ];
+
+    /// Whether it shows all trees together, and so goes on to the horizon.
+    fn is_last(self) -> bool {
+        matches!(self, Rung::ShaderMap | Rung::Shells)
+    }
 
     /// The name that users write.
     pub fn name(self) -> &'static str {
@@ -70,14 +78,15 @@ impl Default for Ladder {
 impl Ladder {
     /// What scenes have that say nothing: all rungs, and no meshes where the rasteriser, the device or the memory does not take them.
     pub const AUTO: Ladder =
-        Ladder { steps: [step(Rung::Mesh), step(Rung::ZField), step(Rung::ShaderMap), None], yields: true };
+        Ladder { steps: steps([Some(Rung::Mesh), Some(Rung::ZField), Some(Rung::ShaderMap)]), yields: true };
     /// z-fields near, the shader-map far (BN12).
     pub const BN12: Ladder =
-        Ladder { steps: [step(Rung::ZField), step(Rung::ShaderMap), None, None], yields: false };
+        Ladder { steps: steps([Some(Rung::ZField), Some(Rung::ShaderMap), None]), yields: false };
     /// z-fields at any distance.
-    pub const ZFIELD: Ladder = Ladder { steps: [step(Rung::ZField), None, None, None], yields: false };
+    pub const ZFIELD: Ladder = Ladder { steps: steps([Some(Rung::ZField), None, None]), yields: false };
     /// The shader-map at any distance.
-    pub const SHADER_MAP: Ladder = Ladder { steps: [step(Rung::ShaderMap), None, None, None], yields: false };
+    pub const SHADER_MAP: Ladder =
+        Ladder { steps: steps([Some(Rung::ShaderMap), None, None]), yields: false };
 
     /// Ladders that have a name of their own.
     pub const SHORTHANDS: [(&'static str, Ladder); 3] =
@@ -91,7 +100,9 @@ impl Ladder {
 
     /// The same without meshes, for a ladder that may go without; `None` for others.
     pub fn without_meshes(&self) -> Option<Ladder> {
-        let steps = [self.steps[1], self.steps[2], self.steps[3], None];
+        let mut steps = self.steps;
+        steps.rotate_left(1);
+        steps[RUNGS - 1] = None;
         self.yields.then_some(Ladder { steps, yields: false })
     }
 
@@ -119,9 +130,19 @@ impl Ladder {
         self.has(Rung::Mesh)
     }
 
-    /// Whether a rung shows the average of a forest.
+    /// Whether the last rung is the average of a forest.
     pub fn averages(&self) -> bool {
         self.has(Rung::ShaderMap)
+    }
+
+    /// Whether the last rung is slices of a forest.
+    pub fn shells(&self) -> bool {
+        self.has(Rung::Shells)
+    }
+
+    /// Whether the last rung shows all trees together, to the horizon.
+    pub fn goes_on(&self) -> bool {
+        self.averages() || self.shells()
     }
 
     /// Whether trees that are drawn one by one hand over to their average.
@@ -174,7 +195,7 @@ impl Ladder {
     /// Distance to which trees are drawn one by one that would be `pixels` high at one metre, m: to where they hand over, or, where
     /// they do not, so far that those at the distance `farthest` have not begun to fade; 0 where none is.
     pub fn range(&self, settings: &Settings, pixels: f64, farthest: f64) -> f64 {
-        match (self.draws_trees(), self.averages()) {
+        match (self.draws_trees(), self.goes_on()) {
             (false, _) => 0.0,
             (true, true) => pixels / self.least_pixels(settings),
             (true, false) => farthest / fade_begin(),
@@ -199,8 +220,17 @@ impl Ladder {
     }
 }
 
-const fn step(rung: Rung) -> Option<Step> {
-    Some(Step { rung, pixels: None })
+/// Steps of these rungs, none of which says a height.
+const fn steps(rungs: [Option<Rung>; 3]) -> [Option<Step>; RUNGS] {
+    let mut steps = [None; RUNGS];
+    let mut k = 0;
+    while k < rungs.len() {
+        if let Some(rung) = rungs[k] {
+            steps[k] = Some(Step { rung, pixels: None });
+        }
+        k += 1;
+    }
+    steps
 }
 
 /// Part of its range to which every tree of a species is opaque, and nothing is handed over.
@@ -243,7 +273,8 @@ impl fmt::Display for LadderError {
 impl std::error::Error for LadderError {}
 
 /// What must stand behind meshes.
-const MESHES_HAND_OVER: &str = "meshes hand over to z-fields or cards: write mesh:256,zfield:4,shader-map or mesh:256,cards:30,shader-map";
+const MESHES_HAND_OVER: &str =
+    "meshes hand over to z-fields or cards: write mesh:256,zfield:4,shader-map or mesh:256,cards:30,shells";
 
 /// The rungs by name, for messages.
 fn rung_names() -> String {
@@ -276,12 +307,17 @@ impl FromStr for Ladder {
             let pixels = match pixels {
                 Some(given) if k + 1 == parts.len() && rung != Rung::Mesh => {
                     let what = "the last rung goes on to the horizon".to_string();
-                    return Err(wrong(what, format!("leave out \":{given}\", or write a rung behind it")));
+                    let behind = if rung.is_last() { "" } else { ", or write a rung behind it" };
+                    return Err(wrong(what, format!("leave out \":{given}\"{behind}")));
                 }
                 Some(given) => Some(height(rung, given).map_err(|(what, remedy)| wrong(what, remedy))?),
                 None => None,
             };
-            if last == Some(Rung::Mesh) && rung == Rung::ShaderMap {
+            if last.is_some_and(Rung::is_last) {
+                let what = format!("{name} behind {}", last.map_or("", Rung::name));
+                return Err(wrong(what, "either goes on to the horizon: write one of them".into()));
+            }
+            if last == Some(Rung::Mesh) && rung.is_last() {
                 let what = format!("{name} behind mesh");
                 return Err(wrong(what, MESHES_HAND_OVER.into()));
             }
@@ -344,6 +380,10 @@ mod tests {
             "mesh,zfield",
             "mesh:256,cards:30,shader-map",
             "mesh:256,cards,zfield:4,shader-map",
+            "mesh:256,cards:30,shells",
+            "mesh:256,zfield:12,shells",
+            "mesh:256,cards:64,zfield:12,shells",
+            "shells",
             "cards",
             "zfield:0.25,shader-map",
             "zfield,shader-map",
@@ -372,7 +412,7 @@ mod tests {
     #[test]
     fn what_is_no_ladder_is_refused_with_the_place_and_a_remedy() {
         for (text, what, remedy) in [
-            ("", "rung 1 of \"\": no name", "the rungs are: mesh, cards, zfield, shader-map"),
+            ("", "rung 1 of \"\": no name", "the rungs are: mesh, cards, zfield, shader-map, shells"),
             ("mesh", "mesh at any distance", "write mesh:256,zfield:4,shader-map"),
             ("mesh:256", "mesh at any distance", "write mesh:256,zfield:4,shader-map"),
             (
@@ -383,7 +423,14 @@ mod tests {
             ("mesh:8,zfield:4", "\"8\" is no height", "16 to 65536 pixels, such as mesh:256"),
             ("mesh:16,zfield:32,shader-map", "32 pixels behind 16", "smaller heights"),
             ("zfield:4,mesh:256", "mesh after zfield", "near to far"),
-            ("zfield:4,shells", "no rung \"shells\"", "the rungs are: mesh, cards, zfield, shader-map"),
+            (
+                "zfield:4,slices",
+                "no rung \"slices\"",
+                "the rungs are: mesh, cards, zfield, shader-map, shells",
+            ),
+            ("zfield:4,shader-map,shells", "shells behind shader-map", "write one of them"),
+            ("mesh:256,shells", "shells behind mesh", "hand over to z-fields or cards"),
+            ("zfield:4,shells:2", "the last rung goes on to the horizon", "leave out \":2\""),
             ("zfeild", "no rung \"zfeild\"", "did you mean \"zfield\"?"),
             ("zfield:4", "the last rung goes on to the horizon", "leave out \":4\""),
             ("zfield:4,shader-map:2", "rung 2 of", "leave out \":2\""),

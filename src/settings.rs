@@ -94,6 +94,9 @@ knobs! {
     card_atlas: u32, "texels", 256..=4096, [512, 1024, 2048], bake [256, 512, 1024, 2048], "texels a side of the pictures of all cards of a species (a power of two); memory grows with the square: 12 MB at 1024";
     cards_min_pixels: f32, "px", 0.25..=4096.0, [30.0, 30.0, 30.0], draw [60.0, 30.0, 15.0], "apparent tree height under which trees are no longer clouds of cards, where the ladder has that rung; cost grows with its inverse square";
     cloud_min_pixels: f32, "px", 1.0..=65536.0, [128.0, 64.0, 32.0], draw [256.0, 128.0, 64.0, 32.0], "apparent tree height under which a cloud of cards begins to give way to its far form of three cards, which it has at half of it";
+    shell_slices: u32, "", 2..=32, [8, 16, 16], bake [4, 8, 16, 32], "slices of shell textures from the ground to the top of the tallest tree (a power of two), where the ladder has that rung; memory grows in proportion: 142 MiB of 16 of 128 texels";
+    shell_texels: u32, "texels", 16..=256, [64, 128, 128], bake [32, 64, 128, 256], "texels a side of a tile of forest of shell textures (a power of two); memory and bake time grow with the square";
+    shell_slice_pixels: f32, "px", 0.25..=64.0, [3.0, 2.0, 1.0], draw [8.0, 4.0, 3.0, 2.0, 1.0], "apparent distance between slices of shell textures, as far as there are as many: slices merge where they would be nearer; cost grows with its inverse";
     zfield_min_pixels: f32, "px", 0.25..=64.0, [6.0, 4.0, 3.0], draw [8.0, 6.0, 4.0, 3.0, 2.0, 1.5], "apparent tree height under which trees are no longer drawn one by one; cost grows with its inverse square";
     convergence: f32, "", 0.1..=0.8, [0.4, 0.45, 0.45], draw [0.3, 0.4, 0.45, 0.6, 0.8], "part of the tree-by-tree range at which light and shadow have become the averages of the tables (BN12, eq. 22-25: 0.8); cost of shadows grows with the square";
     silhouette_min_pixels: f32, "px", 0.25..=64.0, [1.0, 1.0, 1.0], draw [2.0, 1.0, 0.5], "apparent height under which trees on the silhouettes of ridges are no longer drawn either; from zfield_min_pixels on they are as others";
@@ -146,7 +149,13 @@ impl Settings {
         let whole = !knob.whole || value.fract() == 0.0;
         let power = !matches!(
             name,
-            "view_resolution" | "transfer_resolution" | "card_atlas" | "coverage_size" | "cascade_size"
+            "view_resolution"
+                | "transfer_resolution"
+                | "card_atlas"
+                | "shell_slices"
+                | "shell_texels"
+                | "coverage_size"
+                | "cascade_size"
         ) || (value as u64).is_power_of_two();
         let one_of = match name {
             "samples" => matches!(value as u32, 1 | 4 | 8),
@@ -158,7 +167,8 @@ impl Settings {
                 _ if !power
                     || name.ends_with("_size")
                     || name.ends_with("_resolution")
-                    || name.ends_with("_atlas") =>
+                    || name.ends_with("_atlas")
+                    || name.starts_with("shell_") && knob.whole =>
                 {
                     "a power of two, "
                 }

@@ -221,6 +221,7 @@ fn from(views: CacheState, transfer: Option<CacheState>, tables: CacheState) -> 
         levels: None,
         harmonics: None,
         cards: None,
+        shells: None,
         indirect: None,
     }
 }
@@ -331,7 +332,14 @@ fn what_a_plan_does_not_need_is_not_baked() {
     let bare = without(|s| s.species.clear());
     assert_eq!(
         bare,
-        Needs { trees: false, transfer: false, envelopes: false, cards: false, indirect: false }
+        Needs {
+            trees: false,
+            transfer: false,
+            envelopes: false,
+            cards: false,
+            shells: false,
+            indirect: false
+        }
     );
 
     let dir = tempfile::tempdir().unwrap();

@@ -238,8 +238,8 @@ fn a_ladder_is_the_scenes_or_the_one_that_is_given() {
     for command in ["render", "bench", "plan", "reflectance"] {
         for (args, hint) in [
             (
-                &["--ladder", "shells:256,zfield:4,shader-map"][..],
-                "the rungs are: mesh, cards, zfield, shader-map",
+                &["--ladder", "slices:256,zfield:4,shader-map"][..],
+                "the rungs are: mesh, cards, zfield, shader-map, shells",
             ),
             (&["--ladder", "zfield:4"], "the last rung goes on to the horizon"),
             (&["--ladder", "shader-map,zfield"], "near to far"),
@@ -250,8 +250,8 @@ fn a_ladder_is_the_scenes_or_the_one_that_is_given() {
         }
     }
     let folder = dir.path().join("s").display().to_string();
-    let text = refused(2, &["sweep", &file, "-o", &folder, "--ladder", "shells"]);
-    assert!(text.contains("the rungs are: mesh, cards, zfield, shader-map"), "{text}");
+    let text = refused(2, &["sweep", &file, "-o", &folder, "--ladder", "slices"]);
+    assert!(text.contains("the rungs are: mesh, cards, zfield, shader-map, shells"), "{text}");
 }
 
 #[test]

@@ -111,7 +111,10 @@ fn wrong_scenes_name_line_key_and_remedy() {
         (with("[sky]\nradiance = [1, 2]"), "line 9, key `sky.radiance`"),
         (with("[sky]\nradiance = true"), "line 9, key `sky.radiance`"),
         (with("[quality]\npreset = \"fsat\""), "\"fast\"?"),
-        (with("[quality]\nladder = \"shells:256,zfield\""), "the rungs are: mesh, cards, zfield, shader-map"),
+        (
+            with("[quality]\nladder = \"slices:256,zfield\""),
+            "the rungs are: mesh, cards, zfield, shader-map, shells",
+        ),
         (with("[quality]\nladder = \"zfield:4,shader-map:2\""), "the last rung goes on to the horizon"),
         (with("[quality]\nladder = 4"), "quality.ladder"),
         (with("[quality]\ncascade = 4"), "did you mean `cascades`?"),

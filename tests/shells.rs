@@ -25,8 +25,8 @@ fn shells_are_kept_measured_and_drawn() {
     let first = json(&["--verify", "3", "--rays", "300", "-o", picture.to_str().unwrap()]);
     let again = json(&[]);
     assert_eq!((&first["cache"], &again["cache"]), (&"baked".into(), &"hit".into()));
-    // Sixteen tiles of 4 + 2 + 1 slices, mips of 256 to 1 texels of 12 bytes.
-    assert_eq!(first["bytes"], 16 * 7 * 12 * (256 + 64 + 16 + 4 + 1));
+    // Sixteen tiles of 4 + 2 + 1 slices, mips of 256 to 1 texels of 12 bytes, and 16 to 1 of 28.
+    assert_eq!(first["bytes"], 16 * 7 * (12 * (256 + 64 + 16 + 4 + 1) + 28 * (16 + 4 + 1)));
     // 256 trees of 0.0165 a m² on a tile; the pattern has about as many.
     let side = first["tile_side"].as_f64().unwrap();
     assert!((side - (256.0f64 / 0.0165).sqrt()).abs() < 0.04 * side, "{side}");

@@ -1,5 +1,6 @@
 // The ground as the picture's samples see it: which quad, how deep, and the point that a pixel shows.
 #include "frame/ground_point.glsl"
+#include "frame/quad.glsl"
 #include "frame/camera.glsl"
 #include "frame/samples.glsl"
 #include "frame/tile.glsl"
@@ -18,13 +19,6 @@ uint ground_quad(ivec2 pixel, int k) {
     return is_ground(surface) ? surface : 0u;
 }
 
-TerrainQuad fetch_quad(uint quad) {
-    int at = int(quad) * 3;
-    uvec4 a = texelFetch(quads, at), b = texelFetch(quads, at + 1), c = texelFetch(quads, at + 2);
-    return TerrainQuad(ivec2(a.xy), int(a.z), a.w, uintBitsToFloat(b.xy), uintBitsToFloat(b.zw), uintBitsToFloat(c.x), c.y,
-                       uintBitsToFloat(c.z), uintBitsToFloat(c.w));
-}
-
 ForestNode fetch_node(uint quad, ivec2 node) {
     int at = (int(quad * FOREST_NODES * FOREST_NODES) + node.y * int(FOREST_NODES) + node.x) * 4;
     vec4 a = texelFetch(nodes, at), b = texelFetch(nodes, at + 1), c = texelFetch(nodes, at + 2), d = texelFetch(nodes, at + 3);
@@ -33,8 +27,7 @@ ForestNode fetch_node(uint quad, ivec2 node) {
 
 // Where in its square of ground, in [0, 1], a quad has a position from the camera, and how far it has morphed there.
 vec3 place_of(TerrainQuad q, vec3 position) {
-    vec2 cells = (vec2(view.v.grid_camera - q.corner) + (position.xy + view.v.grid_offset) / p.step) / float(q.spacing);
-    return vec3(cells / float(TERRAIN_CELLS), smoothstep(q.morph.x, q.morph.y, length(position)));
+    return vec3(quad_place(q, view.v, position.xy, p.step), smoothstep(q.morph.x, q.morph.y, length(position)));
 }
 
 // The same in its coverage tile; `spans` are the metres that a pixel does along its longer side.
@@ -60,7 +53,7 @@ CoverPoint moved(GroundPoint from, vec2 by, vec3 n) {
         if (distance <= 0.0 || any(notEqual(pixel, clamp(pixel, ivec2(0), ivec2(size) - 1)))) break;
         uint other = ground_quad(pixel, 0);
         if (other == 0u) break;
-        TerrainQuad q = fetch_quad(other - 1u);
+        TerrainQuad q = fetch_quad(quads, other - 1u);
         CoverPoint there = cover_point(q, place_of(q, position), from.cover.footprint - log2(from.cover.scale));
         if (in_tile(there)) c = there;
     }
@@ -69,7 +62,7 @@ CoverPoint moved(GroundPoint from, vec2 by, vec3 n) {
 
 // A point of a quad's ground; `ray` goes through it, with 1 along the camera's axis, and `distance` is its own along that.
 GroundPoint point_of(uint index, vec3 position, vec3 ray, float distance, Camera camera, out vec3 n) {
-    TerrainQuad q = fetch_quad(index);
+    TerrainQuad q = fetch_quad(quads, index);
     float cell = float(q.spacing);
     // Cells from the quad's corner. The last before the end of the terrain is narrower than the others, of the same slopes.
     vec3 place = place_of(q, position);

@@ -18,8 +18,10 @@ vec3 grid_position(TerrainQuad q, ivec2 at) {
 
 // Position from the camera; position in the quad's tiles in [0, 1]; and (xy) position in its square of ground, in [0, 1],
 // from which the former differs beyond the end of the terrain, with (z) how far it has morphed to the coarser grid.
-vec3 terrain_vertex(TerrainQuad q, uint vertex, out vec2 within, out vec3 place) {
-    ivec2 at = ivec2(vertex % TERRAIN_HEIGHTS, vertex / TERRAIN_HEIGHTS), even = at - (at & 1);
+// The vertex is of a mesh of `cells` a side, a power of two.
+vec3 terrain_vertex(TerrainQuad q, uint vertex, uint cells, out vec2 within, out vec3 place) {
+    int stride = int(TERRAIN_CELLS / cells);
+    ivec2 at = stride * ivec2(vertex % (cells + 1u), vertex / (cells + 1u)), even = at - (at & stride);
     vec3 fine = grid_position(q, at);
     float morph = smoothstep(q.morph.x, q.morph.y, length(fine));
     vec3 coarse = grid_position(q, even);

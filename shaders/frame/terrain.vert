@@ -30,7 +30,7 @@ void main() {
     TerrainQuad q = quads.items[p.first_quad + gl_InstanceIndex];
     vec2 within;
     vec3 place;
-    position = terrain_vertex(q, gl_VertexIndex, within, place);
+    position = terrain_vertex(q, gl_VertexIndex, TERRAIN_CELLS, within, place);
     slope_at = (within * float(TERRAIN_SLOPES - 1u) + 0.5) / float(TERRAIN_SLOPES);
     layer = q.layer;
     cover_at = vec3(q.cover_offset + q.cover_scale * place.xy, q.cover_floor * place.z);

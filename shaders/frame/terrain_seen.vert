@@ -9,7 +9,7 @@ layout(location = 0) flat out uint quad;
 void main() {
     vec2 within;
     vec3 place;
-    vec3 position = terrain_vertex(quads.items[p.first_quad + gl_InstanceIndex], gl_VertexIndex, within, place);
+    vec3 position = terrain_vertex(quads.items[p.first_quad + gl_InstanceIndex], gl_VertexIndex, TERRAIN_CELLS, within, place);
     quad = uint(gl_InstanceIndex) + 1u;
     gl_Position = view.v.clip_from_world * vec4(position, 1.0);
 }

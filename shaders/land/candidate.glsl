@@ -3,7 +3,7 @@
 // Needs the parameters `p`, and `pattern`, `listed`, `species`, `scene_size`, `heights` and `densities` to be declared
 // before, and physics/hash.glsl, physics/terrain.glsl and land/density.glsl.
 
-uint edge_colour(ivec2 edge, uint axis) { return hash2(p.seed + axis, hash2(uint(edge.x), uint(edge.y))) & 1u; }
+#include "land/wang.glsl"
 
 // Height, and slope east and north, at a position in metres from the quad's corner.
 vec3 ground(SeedQuad q, vec2 position) {
@@ -28,9 +28,7 @@ bool candidate(SeedQuad q, uint index, uint pattern_count, out Seed s) {
         uint slot = index % p.points_per_tile, k = index / p.points_per_tile;
         ivec2 within = ivec2(k % p.tiles_per_side, k / p.tiles_per_side);
         ivec2 tile = q.tile + within;
-        uint wang = edge_colour(tile, 1u) | edge_colour(tile + ivec2(0, 1), 1u) << 1u | edge_colour(tile, 2u) << 2u |
-                    edge_colour(tile + ivec2(1, 0), 2u) << 3u;
-        vec2 point = pattern.items[wang * p.points_per_tile + slot].position;
+        vec2 point = pattern.items[wang_tile(p.seed, tile) * p.points_per_tile + slot].position;
         if (point.x < 0.0) return false;
         s.position = (vec2(within) + point) * p.tile_side;
         id = hash2(p.seed, hash2(uint(tile.x), hash2(uint(tile.y), slot)));

@@ -124,7 +124,15 @@ impl Grove {
 
     /// Whether any tree is on a ray.
     pub fn occluded(&self, origin: Vec3, direction: Vec3, stack: &mut Stack) -> bool {
+        self.occluded_by_others(u32::MAX, origin, direction, stack)
+    }
+
+    /// Whether any tree but one, by its index, is on a ray.
+    pub fn occluded_by_others(&self, own: u32, origin: Vec3, direction: Vec3, stack: &mut Stack) -> bool {
         let end = self.top.walk(origin, direction, f32::MAX, stack, |stack, k, t_max| {
+            if k == own {
+                return t_max;
+            }
             let tree = &self.trees[k as usize];
             let (o, d) = (tree.to_mesh(origin - tree.base), tree.to_mesh(direction));
             if self.species[tree.species as usize].occludes(o, d, stack) { -1.0 } else { t_max }

@@ -8,6 +8,7 @@ use super::envelope::Envelopes;
 use super::harmonics::Harmonics;
 use super::indirect::{Kind, Mix};
 use super::levels::Levels;
+use super::shells::Shells;
 use super::{CacheState, ForestSettings, Source, SpeciesBake, cache};
 use crate::Result;
 use crate::ladder::Ladder;
@@ -31,6 +32,8 @@ pub struct Baked {
     pub harmonics: Option<Arc<Harmonics>>,
     /// Its cloud of cards, where it is drawn as one.
     pub cards: Option<Arc<CardCloud>>,
+    /// Slices of the scene's forest, one stack for all its species, where a ladder ends with them.
+    pub shells: Option<Arc<Shells>>,
     /// Light that met more than one surface in the scene's forest, where it counts.
     pub indirect: Option<Arc<Indirect>>,
 }
@@ -52,6 +55,8 @@ pub struct BakedFrom {
     pub harmonics: Option<CacheState>,
     /// Its cloud of cards; likewise.
     pub cards: Option<CacheState>,
+    /// Slices of the scene's forest; likewise.
+    pub shells: Option<CacheState>,
     /// Light that met more than one surface; `None` where it is left out.
     pub indirect: Option<CacheState>,
 }
@@ -70,6 +75,8 @@ pub struct Needs {
     pub envelopes: bool,
     /// Clouds of cards, to draw trees as such.
     pub cards: bool,
+    /// Slices of the forest, to draw trees far away as such.
+    pub shells: bool,
     /// Light that met more than one surface, where the settings ask for it.
     pub indirect: bool,
 }
@@ -77,13 +84,14 @@ pub struct Needs {
 impl Needs {
     /// All but what meshes take, for whoever draws by several plans.
     pub const ALL: Needs =
-        Needs { trees: true, transfer: true, envelopes: false, cards: false, indirect: true };
+        Needs { trees: true, transfer: true, envelopes: false, cards: false, shells: false, indirect: true };
 
     /// All that plans of these ladders may need.
     pub fn of(ladders: impl IntoIterator<Item = Ladder>) -> Self {
         ladders.into_iter().fold(Needs::ALL, |all, l| Needs {
             envelopes: all.envelopes || l.meshes(),
             cards: all.cards || l.cards(),
+            shells: all.shells || l.shells(),
             ..all
         })
     }
@@ -96,6 +104,7 @@ impl From<&Plan> for Needs {
             transfer: plan.transfer_bands > 0,
             envelopes: plan.meshes,
             cards: plan.cards,
+            shells: plan.shells,
             indirect: plan.indirect > 0,
         }
     }
@@ -168,12 +177,30 @@ pub fn load_or_bake_scene(
             levels: coarser.map(|l| Arc::new(l.0)),
             harmonics,
             cards: cloud,
+            shells: None,
             indirect: None,
         };
         all.push((
             one,
-            BakedFrom { views, transfer, tables, envelopes, levels, harmonics: light, cards, indirect: None },
+            BakedFrom {
+                views,
+                transfer,
+                tables,
+                envelopes,
+                levels,
+                harmonics: light,
+                cards,
+                shells: None,
+                indirect: None,
+            },
         ));
+    }
+    if needs.trees && needs.shells {
+        let (shells, state) = Shells::load(scene, (&scene.settings).into(), dir, quiet)?;
+        let shells = Arc::new(shells);
+        for (one, from) in &mut all {
+            (one.shells, from.shells) = (Some(shells.clone()), Some(state));
+        }
     }
     if needs.trees && needs.indirect && scene.settings.indirect > 0 {
         load_indirect_light(scene, (&mut all, &keys), dir, quiet)?;

@@ -22,6 +22,12 @@ impl Bounds {
         (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
     }
 
+    /// The same with so much more of height, m.
+    pub fn raised(&self, by: f64) -> Bounds {
+        let [x, y, z] = self.high;
+        Bounds { high: [x, y, z + by], ..*self }
+    }
+
     /// Whether any of it is on the inner side of every plane (n, d), n·p + d ≥ 0 inside, for points from `eye`.
     pub fn touches(&self, planes: &[[f64; 4]], eye: [f64; 3]) -> bool {
         planes.iter().all(|n| {

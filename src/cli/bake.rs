@@ -26,7 +26,7 @@ Examples:
   canopy bake my.toml --ahead               and all else that drawing it takes, meshes too: nothing is baked on first use
   canopy bake oak.glb --forest 0.03         and the tables of a far forest of 0.03 trees per m²
 Bakes are kept in $CANOPY_CACHE, else $XDG_CACHE_HOME/canopy, else ~/.cache/canopy: views (.zfield), light transfer (.transfer), crowns
-around leaves (.envelopes), levels of detail (.levels), clouds of cards (.cards), light of all orders (.indirect) and tables (.forest) apart. Of each it is said whether it was read from there (hit), baked, or baked again because the file
+around leaves (.envelopes), levels of detail (.levels), clouds of cards (.cards), slices of its scene's forest (.shells), light of all orders (.indirect) and tables (.forest) apart. Of each it is said whether it was read from there (hit), baked, or baked again because the file
 was damaged (rebuilt).";
 
 #[derive(clap::Args)]
@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long, value_name = "METRES")]
     height: Option<f64>,
     /// Make what drawing would make on first use as well: of a model what meshes take (the crowns around its leaves, its levels of detail), of a
-    /// scene's species also their tables, light of all orders, and clouds of cards if its ladder has them
+    /// scene's species also their tables, light of all orders, and clouds of cards and slices of forest if its ladder has them
     #[arg(long)]
     ahead: bool,
     /// Compare the bake with its mesh from N directions between the stored views, and the mesh's levels of detail with the whole

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use canopy::bake::shells::{self, Coarse, March, ShellSettings, Shells, Verified};
+use canopy::bake::shells::{self, Coarse, March, ShellSettings, Shells, Told, Verified};
 use canopy::{Result, bake, image, scene};
 
 use super::SCHEMA_VERSION;
@@ -151,12 +151,27 @@ fn verified(v: &Verified) -> String {
         "cover of the ground, and how much more of it the stack hides (± standard error):\n{}\
          from above, by distance from the edges of tiles:\n{}\
          by texels and slices (on the long way) at half density; all of it with --json:\n{}\
+         light of a sun and of the sky on what slices show, by rays, and how much more the bytes tell (rms):\n{}\
          cover from above along edges and inside, and steps from texel to texel:\n{}",
         angles.text(),
         edges.text(),
         coarse(v),
+        light(v),
         seams.text()
     )
+}
+
+/// Light past the own crown, past other trees, and past both: a row a light and side.
+fn light(v: &Verified) -> String {
+    let mut table = Table::new(1, &["light", "side", "own crown", "others", "both", "± of both"]);
+    for l in &v.light {
+        let light = l.elevation.map_or("sky".into(), |elevation| format!("{elevation:.0}°"));
+        let side = if l.seen { "seen" } else { "other" };
+        let told = |t: Told| format!("{:.3} {:+.3} ({:.3})", t.truth, t.difference, t.rms);
+        let error = format!("{:.4}", l.both.error);
+        table.row([light, side.into(), told(l.own), told(l.free), told(l.both), error]);
+    }
+    table.text()
 }
 
 /// Stacks of fewer slices and coarser texels: a row a size of texels and angle, a column a number of slices.

@@ -12,6 +12,7 @@ pub mod indirect;
 pub mod meshes;
 pub mod pages;
 pub mod seeds;
+pub mod shells;
 pub mod species;
 pub mod tables;
 pub mod terrain;

@@ -5,6 +5,7 @@ use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Resource, Sampler, vk};
 use crate::land::density::{DensityMap, HEIGHT_SOFTNESS, SLOPE_SOFTNESS, density_map};
 use crate::physics::correction::Correction;
+use crate::physics::crown::Crown;
 use crate::physics::crown::Frame;
 use crate::physics::forest;
 use crate::physics::masks::combination_table;
@@ -220,6 +221,11 @@ fn view_bases(field: &ZField) -> Vec<ViewBasis> {
         .collect()
 }
 
+/// Mean horizontal area of a species' trees, m² (A of BN12).
+pub(super) fn mean_area(species: &Species, crown: &Crown) -> f32 {
+    std::f32::consts::PI * crown.radius.powi(2) * mean_squared_scale(species) as f32
+}
+
 /// Mean of the squared scale of a species' trees.
 pub(super) fn mean_squared_scale(species: &Species) -> f64 {
     let drawn = tables::mean_squared_scale(species.scale);
@@ -304,7 +310,7 @@ fn rows(
             slope_softness: if slope.is_some() { SLOPE_SOFTNESS * tangent } else { 1.0 },
             bare_below: crown.bare_below(),
             bark_ratio: bake.bark_ratio(),
-            mean_area: std::f32::consts::PI * crown.radius.powi(2) * mean_squared_scale(species) as f32,
+            mean_area: mean_area(species, crown),
             vertical_scale: tables.vertical_scale,
             sky_path: forest::sky_path(tables) as f32,
             hole: tables.hole,

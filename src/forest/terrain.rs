@@ -33,6 +33,8 @@ pub struct TerrainData {
     extent: [f64; 2],
     has_heights: bool,
     texels_per_step: f64,
+    /// How high above the ground a quad of it shows something, m.
+    above: f64,
 }
 
 /// What is drawn: quads, and where each draw's are in [`TerrainData::quads`].
@@ -96,6 +98,7 @@ impl TerrainData {
             refine: 0.0,
             extent: terrain.extent,
             has_heights: terrain.heights.is_some(),
+            above: if plan.shells { plan.tallest } else { 0.0 },
             texels_per_step: if terrain.heights.is_some() { tree.step() / terrain.cell_size } else { 0.0 },
             tree,
         })
@@ -136,7 +139,8 @@ impl TerrainData {
         loop {
             self.refine = refine;
             let tree = &self.tree;
-            let camera = tree.select(eye.position, refine, most, &|b| b.touches(&planes, eye.position));
+            let camera = tree
+                .select(eye.position, refine, most, &|b| b.raised(self.above).touches(&planes, eye.position));
             if let Some(camera) = camera {
                 let (mut near, far): (Vec<_>, Vec<_>) =
                     camera.into_iter().partition(|q| self.tree.nearest(*q, eye.position) <= shadows);

@@ -10,6 +10,7 @@ use super::targets::ImageTargets;
 use super::tonemap::Tonemap;
 use super::trees::cards::Cards;
 use super::trees::meshes::Meshes;
+use super::trees::shells::Shells;
 use super::trees::tiles::TreeTiles;
 use super::trees::zfield::Trees;
 use super::world::World;
@@ -41,6 +42,7 @@ struct Seen {
     horizon: Option<Horizon>,
     meshes: Option<Meshes>,
     cards: Option<Cards>,
+    shells: Option<Shells>,
     trees: Option<TreeTiles>,
 }
 
@@ -55,6 +57,11 @@ impl Seen {
             meshes: meshes.map(|(_, _, data)| Meshes::new(gpu, scene, plan, data)).transpose()?,
             cards: cards
                 .map(|(_, cull, (data, _))| Cards::new(gpu, scene, plan, (cull, data)))
+                .transpose()?,
+            shells: world
+                .shells()
+                .filter(|_| plan.shows_shells())
+                .map(|(_, data)| Shells::new(gpu, scene, plan, data))
                 .transpose()?,
             trees: rows.map(|rows| TreeTiles::new(gpu, scene, plan, rows)).transpose()?,
         })
@@ -144,12 +151,16 @@ impl Canvas {
         let trees = passes.trees.as_ref().filter(|_| plan.shows_z_fields()).zip(world.near());
         let meshes = passes.meshes.as_ref().zip(world.meshes());
         let cards = passes.cards.as_ref().zip(world.cards());
+        let shells = passes.shells.as_ref().zip(world.shells());
         passes.ground.see(r, view, indices, ground, &self.targets);
         if let Some((pass, (_, cull, data))) = meshes {
             pass.see(r, view, (cull, data, plan.last_mesh_range), &self.targets);
         }
         if let Some((pass, (forest, cull, (data, _)))) = cards {
             pass.see(r, view, forest, (cull, data), &self.targets);
+        }
+        if let Some((pass, (forest, data))) = shells {
+            pass.see(r, world, (moment.eye, &streamed.draws, (forest, data)), &self.targets);
         }
         if let Some((horizon, far)) = passes.horizon.as_ref().zip(forest) {
             if streamed.far_trees {
@@ -168,6 +179,9 @@ impl Canvas {
         }
         if let Some((pass, (forest, cull, (data, sky)))) = cards {
             pass.light(r, view, forest, (cull, data, sky), map, seen, &self.targets);
+        }
+        if let Some((pass, (forest, data))) = shells {
+            pass.light(r, world, (forest, data), seen, &self.targets);
         }
         if let Some((tiles, (forest, cull))) = trees {
             tiles.shade(r, view, forest, cull, map, &self.targets);

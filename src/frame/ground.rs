@@ -5,7 +5,7 @@ use super::targets::ImageTargets;
 use super::trees::shader_map::ShaderMap;
 use crate::Result;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
-use crate::gpu::interface::{ForestNode, TERRAIN_CELLS, TERRAIN_HEIGHTS};
+use crate::gpu::interface::{ForestNode, TERRAIN_CELLS};
 use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, ImageDesc, Layers, Program, Recorder, Resource, Sampler,
     Targets, shaders,
@@ -13,16 +13,16 @@ use crate::gpu::{
 use crate::plan::names::pass;
 use crate::plan::{NODE_TEXELS, Plan, ViewMode};
 
-/// Indices of the mesh of a quad of terrain.
+/// Indices of a mesh over a quad of terrain, of so many cells a side.
 ///
 /// # Errors
 /// [`crate::Error::Device`] when out of memory.
-pub fn mesh_indices(gpu: &Gpu) -> Result<Buffer> {
-    let side = TERRAIN_HEIGHTS;
-    let cells = (0..TERRAIN_CELLS * TERRAIN_CELLS).map(|k| (k % TERRAIN_CELLS) + side * (k / TERRAIN_CELLS));
+pub fn mesh_indices(gpu: &Gpu, name: &str, cells: u32) -> Result<Buffer> {
+    let side = cells + 1;
+    let cells = (0..cells * cells).map(|k| (k % cells) + side * (k / cells));
     // Diagonals run the same way at every level, so that a morphed quad is the coarser one exactly.
     let indices: Vec<u32> = cells.flat_map(|k| [k, k + 1, k + side + 1, k, k + side + 1, k + side]).collect();
-    gpu.buffer_with("terrain indices", &indices)
+    gpu.buffer_with(name, &indices)
 }
 
 /// What stands for the forest's data on the ground in scenes without trees.

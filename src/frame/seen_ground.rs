@@ -52,7 +52,10 @@ impl SeenGround {
                     ("COVER_SIDE", plan.coverage_size),
                     ("SAMPLES", plan.samples),
                     ("TREES", u32::from(plan.shows_z_fields())),
-                    ("NEAR_TREES", u32::from(plan.shows_meshes() || plan.shows_cards())),
+                    (
+                        "NEAR_TREES",
+                        u32::from(plan.shows_meshes() || plan.shows_cards() || plan.shows_shells()),
+                    ),
                     ("SKY_DRAWN", u32::from(plan.horizon() || matches!(scene.sky, Sky::LatLong { .. }))),
                     ("HAS_SUN", u32::from(plan.sun)),
                     ("SHADOWED", u32::from(plan.cascades > 0)),

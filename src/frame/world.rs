@@ -15,10 +15,11 @@ use crate::forest::forest_sky::ForestSky;
 use crate::forest::indirect::IndirectData;
 use crate::forest::meshes::MeshData;
 use crate::forest::seeds::SeedData;
+use crate::forest::shells::ShellData;
 use crate::forest::species::SpeciesData;
 use crate::forest::tables::TableData;
 use crate::forest::terrain::TerrainData;
-use crate::gpu::interface::View;
+use crate::gpu::interface::{TERRAIN_CELLS, View};
 use crate::gpu::{Buffer, Gpu, Recorder};
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -36,6 +37,10 @@ pub struct Forest {
     pub species: SpeciesData,
     /// Forest tables of the species.
     pub tables: TableData,
+    /// What the forest leaves of the sky, where harmonics light something.
+    pub sky: Option<ForestSky>,
+    /// Slices of the forest, where trees far away are such.
+    pub shells: Option<ShellData>,
     /// What finds the trees that are drawn one by one, if any can come within range.
     pub near: Option<NearTrees>,
 }
@@ -50,8 +55,6 @@ pub struct NearTrees {
     pub meshes: Option<MeshData>,
     /// What those are drawn from that are clouds of cards.
     pub cards: Option<CardData>,
-    /// What the forest leaves of the sky, where harmonics light something.
-    pub sky: Option<ForestSky>,
 }
 
 /// What lives between frames whatever their size.
@@ -87,7 +90,6 @@ impl Forest {
             Ok(NearTrees {
                 cull: CullData::new(gpu, scene, plan, &tables)?,
                 meshes: plan.meshes.then(|| MeshData::new(gpu, scene, plan, baked)).transpose()?,
-                sky: plan.harmonics().then(|| ForestSky::new(gpu, scene, plan, baked)).transpose()?,
                 cards: plan.cards.then(|| CardData::new(gpu, scene, plan, baked)).transpose()?,
                 casters: (plan.cascades > 0).then(|| CasterData::new(gpu, scene, plan)).transpose()?,
             })
@@ -96,6 +98,8 @@ impl Forest {
         Ok(Forest {
             coverage: CoverageData::new(gpu, scene, plan, &species, &terrain.tree)?,
             seeds: SeedData::new(gpu, scene, plan)?,
+            sky: plan.harmonics().then(|| ForestSky::new(gpu, scene, plan, baked)).transpose()?,
+            shells: plan.shells.then(|| ShellData::new(gpu, scene, plan, baked)).transpose()?,
             near,
             indirect,
             species,
@@ -121,7 +125,7 @@ impl World {
         let forest = plan.forest.then(|| Forest::new(gpu, (scene, plan), baked, &terrain)).transpose()?;
         Ok(World {
             view: gpu.buffer("view", size_of::<View>() as u64)?,
-            terrain_indices: ground::mesh_indices(gpu)?,
+            terrain_indices: ground::mesh_indices(gpu, "terrain indices", TERRAIN_CELLS)?,
             shader_map: forest.as_ref().map(|f| ShaderMap::new(gpu, plan, f)).transpose()?,
             shadows: Shadows::new(gpu, scene, plan)?,
             sky: SkyPass::new(gpu, scene, plan)?,
@@ -137,6 +141,9 @@ impl World {
     pub fn adapt(&mut self, gpu: &Gpu, plan: &Plan) -> Result<()> {
         let Some(forest) = &mut self.forest else { return Ok(()) };
         forest.species.set_ranges(gpu, plan)?;
+        if let Some(shells) = &forest.shells {
+            shells.set_ranges(gpu, plan)?;
+        }
         if let Some(near) = &mut forest.near {
             near.cull.set_limits(plan);
         }
@@ -200,12 +207,18 @@ impl World {
     pub fn cards(&self) -> Option<(&Forest, &CullData, (&CardData, &ForestSky))> {
         let forest = self.forest.as_ref()?;
         let near = forest.near.as_ref()?;
-        Some((forest, &near.cull, (near.cards.as_ref()?, near.sky.as_ref()?)))
+        Some((forest, &near.cull, (near.cards.as_ref()?, forest.sky.as_ref()?)))
+    }
+
+    /// The trees with the slices of them, where trees far away are such.
+    pub fn shells(&self) -> Option<(&Forest, &ShellData)> {
+        let forest = self.forest.as_ref()?;
+        Some((forest, forest.shells.as_ref()?))
     }
 
     /// What the forest leaves of the sky, where harmonics light something.
     pub fn sky_of_forest(&self) -> Option<&ForestSky> {
-        self.forest.as_ref()?.near.as_ref()?.sky.as_ref()
+        self.forest.as_ref()?.sky.as_ref()
     }
 
     /// What finds the trees that cast shadows.

@@ -80,6 +80,24 @@ pub fn irradiance(transfer: &[f64], light: &[f64]) -> f64 {
     transfer.iter().zip(light).map(|(t, l)| t * l).sum()
 }
 
+/// The numbers of what is turned about z, counterclockwise seen from above, by an angle of this cosine and sine: those of ±m turn among
+/// themselves, by m times the angle.
+pub fn turned(numbers: [f32; KEPT], [c, s]: [f32; 2]) -> [f32; KEPT] {
+    let [n0, y, z, x, xy, yz, zz, xz, xx] = numbers;
+    let (c2, s2) = (c * c - s * s, 2.0 * s * c);
+    [
+        n0,
+        c * y + s * x,
+        z,
+        c * x - s * y,
+        c2 * xy + s2 * xx,
+        c * yz + s * xz,
+        zz,
+        c * xz - s * yz,
+        c2 * xx - s2 * xy,
+    ]
+}
+
 /// A number of a transfer as a signed byte.
 pub fn encode(x: f64) -> i8 {
     (127.0 * x / RANGE).round().clamp(-127.0, 127.0) as i8
@@ -217,6 +235,18 @@ mod tests {
                 // What is left out is largest where c = 0: 3/32.
                 assert!((got - c.max(0.0)).abs() < 3.0 / 32.0 + 1e-12, "{c}: {got}");
             }
+        }
+    }
+
+    #[test]
+    fn what_is_turned_has_at_turned_directions_what_it_had() {
+        let numbers: [f32; KEPT] = std::array::from_fn(|k| (1.7 * k as f32 + 0.3).sin());
+        let at = |numbers: [f32; KEPT], w| irradiance(&numbers.map(f64::from), &evaluate(w));
+        for (k, [x, y, z]) in directions().into_iter().enumerate() {
+            let (s, c) = (0.37 * k as f64).sin_cos();
+            let got = at(turned(numbers, [c as f32, s as f32]), [c * x - s * y, s * x + c * y, z]);
+            // Nine numbers and a cosine rounded to singles.
+            assert!((got - at(numbers, [x, y, z])).abs() < 2e-6, "{k}: {got}");
         }
     }
 

@@ -94,6 +94,9 @@ impl Plan {
         if self.cards {
             self.list_cards(scene, &mut items);
         }
+        if self.shells {
+            self.list_shells(scene, &mut items);
+        }
         if self.harmonics() {
             self.list_forest_sky(&mut items);
         }

@@ -11,6 +11,7 @@ pub mod names;
 mod passes;
 mod range;
 mod seeds;
+mod shells;
 mod targets;
 mod tiles;
 
@@ -26,6 +27,7 @@ pub use cards::{CARD_DRAWS, TRANSFER_LAYERS};
 pub use data::{NODE_TEXELS, QUAD_INDEX_BYTES, TREE_TEXELS, tables};
 pub use items::Item;
 pub use meshes::{FACE_TRANSFER_WORDS, envelope_words};
+pub use shells::{SHELL_LIGHT_TEXELS, SHELL_LIGHTS};
 pub use tiles::{Drawing, Rasterizer, TILE_STEPS, TileBuffer, TileBuffers};
 
 /// Storage buffers that every Vulkan device binds, when no device is known.
@@ -122,6 +124,8 @@ pub struct Plan {
     pub far_from: f64,
     /// Whether any tree can come so near an eye that it is a cloud of cards.
     pub cards: bool,
+    /// Whether trees that are not drawn one by one are slices of a forest over the ground.
+    pub shells: bool,
     /// Whether meshes are lit by spherical harmonics, as cards are.
     pub mesh_harmonics: bool,
     /// Largest texel of shadow maps that tell leaves of these apart, m, into which they cast as meshes; 0 where none is a mesh.
@@ -267,7 +271,8 @@ impl Plan {
         if plan.forest {
             plan.seeds(scene, eye, device);
             plan.coverage(scene, eye, device);
-            plan.pair_tables = plan.sun && ladder.averages();
+            plan.pair_tables = plan.sun && ladder.goes_on();
+            plan.shells = ladder.shells();
             if scene.settings.indirect > 0 {
                 plan.indirect = scene.settings.table_densities;
             }
@@ -291,6 +296,7 @@ impl Plan {
             }
         }
         plan.check_cards()?;
+        plan.check_shells(scene, device)?;
         plan.choose_rasterizer(rasterizer, device)?;
         plan.list(scene);
         plan.check(scene.settings.memory_mib, device)?;
@@ -324,6 +330,7 @@ impl Plan {
             cloud_range: 0.0,
             far_from: 0.0,
             cards: false,
+            shells: false,
             mesh_harmonics: s.light_model == 1,
             mesh_range: Vec::new(),
             last_mesh_range: 0.0,

@@ -34,6 +34,10 @@ pub mod pass {
     pub const CARDS: &str = "cards";
     /// Light on cards.
     pub const CARD_LIGHT: &str = "card light";
+    /// Shells: which slice each sample sees.
+    pub const SHELLS: &str = "shells";
+    /// Light on shells.
+    pub const SHELL_LIGHT: &str = "shell light";
     /// Trees far away, and average light.
     pub const SHADER_MAP: &str = "shader-map";
     /// The ground.
@@ -100,12 +104,18 @@ pub mod pipeline {
     pub const CARDS: &str = "cards";
     /// Light on cards.
     pub const CARD_LIGHT: &str = "card light";
+    /// Shells: which slice each sample sees.
+    pub const SHELLS: &str = "shells";
+    /// Light on shells.
+    pub const SHELL_LIGHT: &str = "shell light";
     /// What of all trees' pipelines sways them.
     pub const SWAY: &str = "sway of trees";
     /// What of meshes' pipelines moves their leaves.
     pub const FLUTTER: &str = "flutter of leaves";
     /// What of the ground's pipelines moves the shader-map.
     pub const GUSTS: &str = "gusts over the shader-map";
+    /// What of shells' pipelines moves them.
+    pub const GUSTS_OF_SHELLS: &str = "gusts over shells";
     /// What of a tree's pipelines finds where the sun enters.
     pub const LIGHT_RAY: &str = "light ray of trees";
 }
@@ -168,6 +178,16 @@ pub mod resource {
     pub const CARD_SURFACES: &str = "card surfaces";
     /// Light transfer of what is painted on cards.
     pub const CARD_TRANSFERS: &str = "card transfers";
+    /// What shells are of, and where.
+    pub const SHELL_TABLE: &str = "shell table";
+    /// Cover of shells by trees.
+    pub const SHELL_COVERS: &str = "shell covers";
+    /// Reflectance of shells, and share of leaves.
+    pub const SHELL_REFLECTANCES: &str = "shell reflectances";
+    /// Transmittance of shells, and height.
+    pub const SHELL_TRANSMITTANCES: &str = "shell transmittances";
+    /// How light comes to shells.
+    pub const SHELL_LIGHTS: &str = "shell lights";
     /// What the forest leaves of the sky.
     pub const FOREST_SKY: &str = "forest sky";
     /// Density maps.

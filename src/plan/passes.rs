@@ -27,6 +27,10 @@ const CARD_LISTS: &str = "how many of the trees in view are clouds of cards";
 const CARDS: &str = "the card that each sample sees";
 const CARD_LIGHT: &str = "light on what is painted on cards, once a pixel and card that it sees";
 
+/// Why there are passes for shells.
+const SHELLS: &str = "the slice of forest that each sample sees beyond single trees";
+const SHELL_LIGHT: &str = "light on slices, once a pixel and slice that it sees";
+
 impl Plan {
     /// What the wind adds: no memory, because what a tree's sway takes is in words that its records have to spare.
     pub(super) fn list_wind(&self, scene: &Scene, items: &mut Items) {
@@ -47,6 +51,9 @@ impl Plan {
         }
         if self.ladder.averages() {
             add(pipeline::GUSTS, "and the shader-map is looked up where gusts have moved crowns from");
+        }
+        if self.shells {
+            add(pipeline::GUSTS_OF_SHELLS, "and slices are looked up where gusts have moved crowns from");
         }
     }
 
@@ -76,6 +83,10 @@ impl Plan {
             add(pipeline::CARD_LISTS, CARD_LISTS);
             add(pipeline::CARDS, CARDS);
             add(pipeline::CARD_LIGHT, CARD_LIGHT);
+        }
+        if self.shells {
+            add(pipeline::SHELLS, SHELLS);
+            add(pipeline::SHELL_LIGHT, SHELL_LIGHT);
         }
         if self.z_fields {
             let pipelines = if tiles { &tiles::TREE_PIPELINES[..] } else { &TREE_PIPELINES };
@@ -118,7 +129,12 @@ impl Plan {
             add(pass::SKY, "the sky is an image");
         }
         if trees {
-            add(pass::SHADER_MAP, "trees beyond range, and average light");
+            let trees = if self.shells {
+                "average light on the ground"
+            } else {
+                "trees beyond range, and average light"
+            };
+            add(pass::SHADER_MAP, trees);
         }
         add(pass::TERRAIN, "the ground");
         let tiles = self.rasterizer == Rasterizer::Tiles;
@@ -133,6 +149,9 @@ impl Plan {
             add(pass::CARD_LISTS, CARD_LISTS);
             add(pass::CARDS, CARDS);
         }
+        if self.shells {
+            add(pass::SHELLS, SHELLS);
+        }
         if self.z_fields && tiles {
             tiles::TREE_PASSES.iter().for_each(|(name, reason)| add(name, reason));
         }
@@ -144,6 +163,9 @@ impl Plan {
         }
         if self.cards {
             add(pass::CARD_LIGHT, CARD_LIGHT);
+        }
+        if self.shells {
+            add(pass::SHELL_LIGHT, SHELL_LIGHT);
         }
         if self.z_fields && tiles {
             add(pass::TREE_LIGHT, "light on trees, once a pixel and tree that it sees");

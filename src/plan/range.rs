@@ -2,7 +2,7 @@
 
 use super::{Plan, meshes};
 use crate::camera::Eye;
-use crate::gpu::interface::MESH_TREES;
+use crate::gpu::interface::{HANDOVER_FROM, MESH_TREES};
 use crate::scene::Scene;
 
 impl Plan {
@@ -31,8 +31,12 @@ impl Plan {
             self.range = self.range.max(range);
         }
         self.last_mesh_range *= self.fit_meshes(scene);
-        if self.ladder.averages() {
+        if self.ladder.goes_on() {
             self.convergence = f64::from(s.convergence);
+        }
+        // Slices are no average: trees before them keep light of their own until they hand over (BN12, section 7).
+        if self.ladder.shells() {
+            self.convergence = self.convergence.max(f64::from(HANDOVER_FROM));
         }
         // The box of a tree is no wider than twice its reach. Filtered search is worth its price up to sqrt 2 texels a
         // pixel; and views 10 degrees apart differ by less than a pixel under about eleven pixels: sin 10 degrees of
@@ -140,13 +144,13 @@ impl Plan {
     /// from a place: whether none of them has begun to fade.
     pub fn trees_within(&self, extent: [f64; 2], ground: [f64; 2], place: [f64; 3]) -> bool {
         let farthest = farthest_in(self.trees_box(extent, ground), place);
-        !self.forest || self.ladder.averages() || farthest <= self.ladder.opaque_to(self.range)
+        !self.forest || self.ladder.goes_on() || farthest <= self.ladder.opaque_to(self.range)
     }
 
-    /// Distance to which no tree has begun to hand over to an average, m.
+    /// Distance to which no tree has begun to hand over to what shows all together, m.
     pub fn averages_from(&self) -> f64 {
         let nearest = self.species_range.iter().copied().fold(f64::INFINITY, f64::min);
-        if self.ladder.averages() { self.ladder.opaque_to(nearest) } else { f64::INFINITY }
+        if self.ladder.goes_on() { self.ladder.opaque_to(nearest) } else { f64::INFINITY }
     }
 
     /// Whether any tree of a scene may be near enough to a place to be drawn by itself, on ground between two heights.

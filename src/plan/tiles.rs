@@ -224,8 +224,9 @@ impl Plan {
         device: Option<&DeviceInfo>,
     ) -> Result<()> {
         self.list_lanes = LIST_LANES[usize::from(device.is_some_and(|d| d.kind != "cpu"))];
-        let beyond =
-            device.filter(|_| self.z_fields || !self.cards).and_then(|d| TileBuffers::new(self).beyond(d));
+        let beyond = device
+            .filter(|_| self.z_fields || !(self.cards || self.shells))
+            .and_then(|d| TileBuffers::new(self).beyond(d));
         let narrow = device.filter(|d| self.z_fields && d.max_vertex_components < tree_components());
         if let Some(d) = narrow.filter(|_| wanted == Some(Rasterizer::Graphics) || beyond.is_some()) {
             return Err(Error::Usage(format!(
@@ -236,14 +237,15 @@ impl Plan {
                 tree_components()
             )));
         }
-        let near = match (self.meshes, self.cards) {
-            (true, _) => Some(("meshes", "mesh")),
-            (_, true) => Some(("clouds of cards", "cards")),
+        let near = match (self.meshes, self.cards, self.shells) {
+            (true, ..) => Some(("meshes near this camera", "mesh")),
+            (_, true, _) => Some(("clouds of cards near this camera", "cards")),
+            (.., true) => Some(("slices of a forest", "shells")),
             _ => None,
         };
         if let Some((what, rung)) = near.filter(|_| wanted == Some(Rasterizer::Graphics)) {
             return Err(Error::Usage(format!(
-                "--rasterizer graphics: trees are {what} near this camera, and those are lit where tiles see them: use --rasterizer \
+                "--rasterizer graphics: trees are {what}, and those are lit where tiles see them: use --rasterizer \
                  tiles, or a ladder without {rung}"
             )));
         }
@@ -251,7 +253,7 @@ impl Plan {
             (None, Some(why)) if near.is_some() => {
                 let (what, rung) = near.unwrap_or_default();
                 return Err(Error::Usage(format!(
-                    "trees are {what} near this camera, which takes tiles: {why} on this device: draw fewer trees or a smaller picture, \
+                    "trees are {what}, which takes tiles: {why} on this device: draw fewer trees or a smaller picture, \
                      or use a ladder without {rung}"
                 )));
             }

@@ -30,6 +30,7 @@ mod resize;
 mod seeds;
 mod shader_map;
 mod shadows_kept;
+mod shells;
 mod silhouettes;
 mod soak;
 mod tables;

@@ -1,8 +1,8 @@
 // Surfaces of trees that the graphics pipeline has found, lit once a pixel and surface. One workgroup a tile of 8 x 8 pixels, as for
 // z-fields: every invocation lists what its column of pixels sees; all light the list in turn; each puts its pixels together.
 //
-// Whoever includes this says which surfaces are its own, which others' light is in the picture before (is_mine, is_stored), of which tree one is
-// (tree_seen) and what it shows (shade). Needs `view`, `trees`, `p.size`, frame/shown.glsl, frame/camera.glsl and frame/surfaces_seen.glsl.
+// Whoever includes this says which surfaces are its own, which others' light is in the picture before (is_mine, is_stored), of which species one
+// is, counted from 1 (species_seen; 0: it is not known) and what it shows (shade). Needs `view`, `p.size`, frame/shown.glsl, frame/camera.glsl and frame/surfaces_seen.glsl.
 
 layout(local_size_x = 8) in;
 layout(binding = 7) uniform usamplerBuffer seen; // z-field trees, which are before such surfaces
@@ -62,8 +62,7 @@ void main() {
         if (covered != 0u) store_pixel(pixel, all);
 #ifdef LAYERS
         if (first != ~0u) {
-            uint kind = species_row(texelFetch(trees, int(tree_seen(ranks[first])) * 8 + 1).z);
-            store_first(pixel, kind + 1u, surface_depth(pixel, 0));
+            store_first(pixel, species_seen(ranks[first]), surface_depth(pixel, 0));
         }
 #endif
     }

@@ -20,7 +20,7 @@ ForestNode node(TerrainQuad q, ivec2 at) {
     vec2 within;
     vec3 place;
     uint vertex = uint(2 * at.y) * TERRAIN_HEIGHTS + uint(2 * at.x);
-    vec3 position = terrain_vertex(q, vertex, within, place);
+    vec3 position = terrain_vertex(q, vertex, TERRAIN_CELLS, within, place);
     vec2 slope = texelFetch(slope_tiles, ivec3(at * int((TERRAIN_SLOPES - 1u) / (FOREST_NODES - 1u)), q.layer), 0).rg;
     vec3 n = normalize(vec3(-slope, 1.0));
     vec2 cover_at = q.cover_offset + q.cover_scale * place.xy;

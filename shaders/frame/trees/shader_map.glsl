@@ -22,6 +22,7 @@ layout(constant_id = 2) const uint SPECIES_COUNT = 0u;
 layout(constant_id = 3) const float TABLE_ANGLES = 16.0;
 layout(constant_id = 4) const float TABLE_DENSITIES = 8.0;
 layout(constant_id = 5) const bool PAIR_TABLES = true; // the sun's average light is known, and has a share
+layout(constant_id = 8) const bool SHOWS_TREES = true; // else what shows all trees together hides the ground by itself
 
 TableSlope slope_of(vec3 v, vec3 n, uint k) {
     return table_slope(view_table, v, view.v.sun_direction, n, species.items[k].vertical_scale, float(k), TABLE_ANGLES, TABLE_DENSITIES,
@@ -77,7 +78,7 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         float past = clamp((v.z * distance - (depth.x - depth.y)) / max(2.0 * depth.y, 1e-3), 0.0, 1.0);
         TableForest t = table_forest(pair_table, view_table, slope_of(v, n, k), total, known, s.max_thickness, float(k),
                                      TABLE_ANGLES, TABLE_DENSITIES, PAIR_TABLES, mixed, past);
-        float path = share * t.seen, relative = relative_distance(distance, s.range), part = path * handed_over(relative);
+        float path = share * t.seen, relative = relative_distance(distance, s.range), part = SHOWS_TREES ? path * handed_over(relative) : 0.0;
         f.seen += path;
         f.over += part;
         f.middle += path * depth.x;

@@ -31,7 +31,7 @@ pub fn load(mesh: &Mesh, dir: Option<&Path>, quiet: bool) -> Result<(Harmonics, 
 }
 
 /// BLAKE3 of everything that it depends on.
-fn key(mesh: &Mesh) -> [u8; 32] {
+pub fn key(mesh: &Mesh) -> [u8; 32] {
     let mut fields = Fields::new("canopy harmonics");
     for x in [FORMAT.version, RAYS, SKY_DIRECTIONS as u32] {
         fields.put(&x.to_le_bytes());

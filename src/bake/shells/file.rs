@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use super::{ShellSettings, Shells, empty, slices};
+use super::{FREE_RAYS, LIGHT_IMAGES, LIGHT_TEXELS, LightMip, ShellSettings, Shells, empty, slices};
 use crate::Result;
 use crate::bake::CacheState;
-use crate::bake::cache::put_mesh;
 use crate::bake::file::{Fields, Format, load_or_build};
+use crate::bake::harmonics;
 use crate::land::pattern::TILES;
 use crate::scene::{Distribution, Scene};
 
-const FORMAT: Format = Format { magic: *b"CANOPYSH", version: 1, extension: "shells" };
+const FORMAT: Format = Format { magic: *b"CANOPYSH", version: 2, extension: "shells" };
 /// Bytes of the head: side of a tile, height, largest reflectance and transmittance.
 const HEAD: usize = 8 + 4 + 4 * 6;
 
@@ -27,20 +27,25 @@ pub fn load(
         |parts| decode(parts, settings),
         |shells, put| {
             put(&head(shells))?;
-            shells.levels.iter().flatten().flat_map(|mip| mip.images()).try_for_each(|image| put(image))
+            shells.images().try_for_each(|image| put(image))
         },
-        || Shells::bake(scene, settings, quiet),
+        || Shells::bake(scene, settings, dir, quiet),
         quiet,
     )
 }
 
 /// Bytes of the head, and of each image of each mip of each level.
 fn sizes(settings: ShellSettings) -> Vec<usize> {
-    let slices = (0..=settings.slices.ilog2()).map(|l| settings.slices as usize >> l);
-    let images = slices.zip(empty(settings)).flat_map(|(slices, mips)| {
-        mips.into_iter().flat_map(move |mip| [4 * TILES * slices * (mip.side as usize).pow(2); 3])
+    let slices = |level: usize| settings.slices as usize >> level;
+    let texels = |level: usize, side: u32| 4 * TILES * slices(level) * (side as usize).pow(2);
+    let images = empty(settings)
+        .into_iter()
+        .enumerate()
+        .flat_map(|(level, mips)| mips.into_iter().flat_map(move |mip| [texels(level, mip.side); 3]));
+    let light = LightMip::empty(settings).into_iter().enumerate().flat_map(|(level, mips)| {
+        mips.into_iter().flat_map(move |mip| [texels(level, mip.side); LIGHT_IMAGES])
     });
-    std::iter::once(HEAD).chain(images).collect()
+    std::iter::once(HEAD).chain(images).chain(light).collect()
 }
 
 /// BLAKE3 of everything that they depend on: the pattern, models, reflectances, scales and densities.
@@ -52,6 +57,8 @@ fn key(scene: &Scene, settings: ShellSettings) -> [u8; 32] {
         settings.texels,
         slices::SAMPLES,
         slices::SHARES as u32,
+        LIGHT_TEXELS,
+        FREE_RAYS,
         scene.seed,
     ];
     fields.put(&numbers.map(u32::to_le_bytes).concat());
@@ -66,7 +73,8 @@ fn key(scene: &Scene, settings: ShellSettings) -> [u8; 32] {
         for rgb in [s.optics.leaf_reflectance, s.optics.leaf_transmittance, s.optics.bark_reflectance] {
             fields.put(rgb.as_ref().map_or(&[], bytemuck::bytes_of));
         }
-        put_mesh(&mut fields, &s.mesh);
+        // That of how light comes to the mesh is one of the mesh, too.
+        fields.put(&harmonics::file::key(&s.mesh));
     }
     fields.key()
 }
@@ -88,12 +96,16 @@ fn decode(parts: Vec<Vec<u8>>, settings: ShellSettings) -> Shells {
         height: number(0),
         most: [[number(1), number(2), number(3)], [number(4), number(5), number(6)]],
         levels: empty(settings),
+        light: LightMip::empty(settings),
     };
     let mut images = parts.into_iter().skip(1);
     for mip in shells.levels.iter_mut().flatten() {
         for image in [&mut mip.cover, &mut mip.reflected, &mut mip.passed] {
             *image = images.next().unwrap_or_default();
         }
+    }
+    for image in shells.light.iter_mut().flatten().flat_map(|mip| &mut mip.images) {
+        *image = images.next().unwrap_or_default();
     }
     shells
 }

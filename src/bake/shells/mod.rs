@@ -11,6 +11,8 @@
 mod coarse;
 mod edges;
 mod file;
+mod light;
+mod lit;
 mod march;
 mod patch;
 mod picture;
@@ -26,6 +28,8 @@ use rayon::prelude::*;
 
 pub use coarse::Coarse;
 pub use edges::Near;
+pub use light::{FREE_RANGE, FREE_RAYS, LIGHT, LIGHT_IMAGES, LIGHT_TEXELS, LightMip, Lights};
+pub use lit::{Lit, Told};
 pub use march::{March, Stack, at_share};
 pub use patch::{Image, Patch};
 pub use picture::picture;
@@ -39,6 +43,7 @@ use super::optics::{Colours, colours};
 use crate::land::pattern::TILES;
 use crate::progress::Progress;
 use crate::scene::Scene;
+use crate::settings::Settings;
 use crate::{Error, Result};
 
 /// Rows of texels that are painted at once: so many samples of all slices are held.
@@ -61,10 +66,16 @@ impl Default for ShellSettings {
     }
 }
 
+impl From<&Settings> for ShellSettings {
+    fn from(s: &Settings) -> Self {
+        ShellSettings { slices: s.shell_slices, texels: s.shell_texels }
+    }
+}
+
 impl ShellSettings {
     fn check(self) -> Result<()> {
         let fits = |n: u32, low: u32, high: u32| n.is_power_of_two() && (low..=high).contains(&n);
-        // The most of both are a gibibyte.
+        // The most of both are 1.1 GiB.
         if fits(self.slices, 2, 32) && fits(self.texels, 16, 256) {
             return Ok(());
         }
@@ -109,6 +120,8 @@ pub struct Shells {
     pub most: [[f32; 3]; 2],
     /// By level, from all slices to one, each with its mips from the finest to one texel a tile.
     pub levels: Vec<Vec<Mip>>,
+    /// How light comes there, by level, each with its mips from the finest, [`LIGHT_TEXELS`] times as coarse as that of cover, to one texel a tile.
+    pub light: Vec<Vec<LightMip>>,
 }
 
 /// A scene's forest as shells are made of it.
@@ -175,16 +188,8 @@ impl Forest {
         [r0, r1, r2, f32::from(u8::from(leaf)), t0, t1, t2, seen.height / slices as f32]
     }
 
-    /// The finest slices of a window of a tile, or of any trees that stand there, and what they hide from straight above; as [`Slices`] has them.
-    pub fn slices(&self, images: &[Image], window: Window) -> (Vec<Texel>, Vec<[f32; SHARES]>) {
-        let samples = Samples::paint(&self.kinds, images, window);
-        let value = |seen: &Seen| self.values(&images[seen.tree as usize], seen, window.slices);
-        let texels = samples.texels(value).into_iter().map(|(cover, values)| Texel { cover, values });
-        (texels.collect(), samples.above())
-    }
-
-    /// The finest slices of a tile. Painted by bands of rows, for no one needs the samples of all rows at once.
-    pub fn tile(&self, kind: usize, settings: ShellSettings) -> Slices {
+    /// The finest slices of a tile. Painted by bands of rows, for no one needs the samples of all rows at once; `show` gets those of each band.
+    pub fn tile(&self, kind: usize, settings: ShellSettings, mut show: impl FnMut(&Samples)) -> Slices {
         let ShellSettings { slices, texels } = settings;
         let texel = self.patch.side as f32 / texels as f32;
         let size = (texels * texels) as usize;
@@ -193,40 +198,46 @@ impl Forest {
         for first in (0..texels).step_by(BAND as usize) {
             let low = Vec2::new(0.0, first as f32 * texel);
             let window = Window { low, texel, size: [texels, BAND], slices, height: self.height };
-            let (band, above) = self.slices(&self.patch.tiles[kind], window);
+            let images = &self.patch.tiles[kind];
+            let samples = Samples::paint(&self.kinds, images, window);
+            let value = |seen: &Seen| self.values(&images[seen.tree as usize], seen, slices);
             let rows = (BAND * texels) as usize;
-            for (slice, from) in band.chunks_exact(rows).enumerate() {
+            for (slice, from) in samples.texels(value).chunks_exact(rows).enumerate() {
                 let at = slice * size + (first * texels) as usize;
-                all.texels[at..at + rows].copy_from_slice(from);
+                let to = all.texels[at..at + rows].iter_mut().zip(from);
+                to.for_each(|(to, (cover, values))| *to = Texel { cover: *cover, values: *values });
             }
-            all.above.extend(above);
+            all.above.extend(samples.above());
+            show(&samples);
         }
         all
     }
 }
 
 impl Shells {
-    /// Makes them, on all threads of the current rayon pool; the result is the same bits for any number of them.
+    /// Makes them, on all threads of the current rayon pool; the result is the same bits for any number of them. How light comes to the faces of
+    /// the species is in the cache in `dir`, or made and put there.
     ///
     /// # Errors
     /// [`Error::Usage`] for settings out of range, and as [`Forest::new`].
-    pub fn bake(scene: &Scene, settings: ShellSettings, quiet: bool) -> Result<Self> {
+    pub fn bake(scene: &Scene, settings: ShellSettings, dir: Option<&Path>, quiet: bool) -> Result<Self> {
         settings.check()?;
-        Ok(Shells::of(&Forest::new(scene)?, settings, quiet))
+        let forest = Forest::new(scene)?;
+        Ok(Shells::of(&forest, &Lights::new(scene, &forest, dir, quiet)?, settings, quiet))
     }
 
     /// Those of a forest.
-    fn of(forest: &Forest, settings: ShellSettings, quiet: bool) -> Self {
+    fn of(forest: &Forest, lights: &Lights, settings: ShellSettings, quiet: bool) -> Self {
         let progress = Progress::new("baking shells", TILES as u64, quiet);
         let most = forest.most();
-        let tiles: Vec<Vec<Vec<Mip>>> = (0..TILES)
-            .into_par_iter()
-            .map(|kind| {
-                let levels = levels(forest.tile(kind, settings), most);
-                progress.step(1);
-                levels
-            })
-            .collect();
+        let of = |kind| {
+            let mut light = lights.tile(forest, kind, settings);
+            let finest = forest.tile(kind, settings, |samples| light.add(samples));
+            let light = levels(light.slices(&finest), LightMip::new);
+            progress.step(1);
+            (levels(finest, |slices| quantised(slices, most)), light)
+        };
+        let tiles: Vec<_> = (0..TILES).into_par_iter().map(of).collect();
         progress.finish();
         let mut shells = Shells {
             settings,
@@ -234,12 +245,16 @@ impl Shells {
             height: forest.height,
             most,
             levels: empty(settings),
+            light: LightMip::empty(settings),
         };
-        for tile in &tiles {
-            for (to, from) in shells.levels.iter_mut().flatten().zip(tile.iter().flatten()) {
+        for (levels, light) in &tiles {
+            for (to, from) in shells.levels.iter_mut().flatten().zip(levels.iter().flatten()) {
                 to.cover.extend(&from.cover);
                 to.reflected.extend(&from.reflected);
                 to.passed.extend(&from.passed);
+            }
+            for (to, from) in shells.light.iter_mut().flatten().zip(light.iter().flatten()) {
+                to.images.iter_mut().zip(&from.images).for_each(|(to, from)| to.extend(from));
             }
         }
         shells
@@ -261,22 +276,27 @@ impl Shells {
 
     /// Bytes of all images.
     pub fn bytes(&self) -> u64 {
-        let images = self.levels.iter().flatten().flat_map(Mip::images);
-        images.map(|image| image.len() as u64).sum()
+        self.images().map(|image| image.len() as u64).sum()
+    }
+
+    /// All images, in the order of files.
+    fn images(&self) -> impl Iterator<Item = &Vec<u8>> {
+        let light = self.light.iter().flatten().flat_map(|mip| &mip.images);
+        self.levels.iter().flatten().flat_map(Mip::images).chain(light)
     }
 }
 
 /// Levels and mips of one tile, as bytes.
-fn levels(finest: Slices, most: [[f32; 3]; 2]) -> Vec<Vec<Mip>> {
-    let halved = |s: &Slices| (s.side > 1).then(|| s.halved());
-    let merged = |s: &Slices| (s.texels.len() > s.above.len()).then(|| s.merged());
-    let mut levels: Vec<Vec<Mip>> = Vec::new();
+fn levels<const N: usize, T>(finest: Slices<N>, bytes: impl Fn(&Slices<N>) -> T) -> Vec<Vec<T>> {
+    let halved = |s: &Slices<N>| (s.side > 1).then(|| s.halved());
+    let merged = |s: &Slices<N>| (s.texels.len() > s.above.len()).then(|| s.merged());
+    let mut levels: Vec<Vec<T>> = Vec::new();
     for mip in std::iter::successors(Some(finest), halved) {
         for (level, slices) in std::iter::successors(Some(mip.fitted()), merged).enumerate() {
             if levels.len() == level {
                 levels.push(Vec::new());
             }
-            levels[level].push(quantised(&slices, most));
+            levels[level].push(bytes(&slices));
         }
     }
     levels
@@ -304,5 +324,7 @@ fn empty(settings: ShellSettings) -> Vec<Vec<Mip>> {
     (0..=settings.slices.ilog2()).map(|_| mips().collect()).collect()
 }
 
+#[cfg(test)]
+mod light_tests;
 #[cfg(test)]
 mod tests;

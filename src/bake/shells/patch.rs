@@ -53,6 +53,8 @@ pub struct Patch {
     pub tiles: Vec<Vec<Image>>,
     /// How many stand in each tile.
     pub standing: Vec<usize>,
+    /// The other trees of the eight neighbours that a tile is painted amid: they show nothing in it, and shade it.
+    pub around: Vec<Vec<Image>>,
 }
 
 /// Where a point of a tile belongs.
@@ -85,23 +87,20 @@ impl Patch {
         }
         let standing: Vec<Vec<Image>> = (0..TILES).map(|kind| plant(scene, &layout, kind)).collect();
         let side = layout.tile_side as f32;
+        let reaches_in = |i: &Image| {
+            let base = i.tree.base.truncate();
+            let reach = i.tree.scale * reaches[i.tree.species as usize];
+            base.distance(base.clamp(Vec2::ZERO, Vec2::splat(side))) < reach
+        };
         let tiles = (0..TILES).map(|kind| {
-            let mut images = standing[kind].clone();
-            for (step, neighbour) in neighbours(scene.seed, kind) {
-                let moved = standing[neighbour].iter().map(|i| i.moved(step * side));
-                images.extend(moved.filter(|i| {
-                    let base = i.tree.base.truncate();
-                    let reach = i.tree.scale * reaches[i.tree.species as usize];
-                    base.distance(base.clamp(Vec2::ZERO, Vec2::splat(side))) < reach
-                }));
-            }
-            images
+            let moved = neighbours(scene.seed, kind)
+                .into_iter()
+                .flat_map(|(step, neighbour)| standing[neighbour].iter().map(move |i| i.moved(step * side)));
+            let (shown, around): (Vec<Image>, Vec<Image>) = moved.partition(reaches_in);
+            ([&standing[kind][..], &shown].concat(), around)
         });
-        Ok(Patch {
-            side: layout.tile_side,
-            tiles: tiles.collect(),
-            standing: standing.iter().map(Vec::len).collect(),
-        })
+        let (tiles, around) = tiles.unzip();
+        Ok(Patch { side: layout.tile_side, tiles, around, standing: standing.iter().map(Vec::len).collect() })
     }
 
     /// The trees that stand in a tile.

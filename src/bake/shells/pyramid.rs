@@ -23,17 +23,24 @@ pub const VALUES: usize = 8;
 const CLEAR: f32 = 1e-4;
 
 /// A texel of a slice, all of it premultiplied by cover.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Texel {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Texel<const N: usize = VALUES> {
     /// Share of it that is covered at 1/4, 2/4, 3/4 and all of the full density.
     pub cover: [f32; SHARES],
-    /// At full density, of what is seen: reflectance RGB, share of leaves, transmittance RGB, height above the ground over the stack's.
-    pub values: [f32; VALUES],
+    /// At full density, of what is seen: reflectance RGB, share of leaves, transmittance RGB, height above the ground over the stack's; or how
+    /// light comes to it (`light.rs`).
+    pub values: [f32; N],
 }
 
-impl Texel {
+impl<const N: usize> Default for Texel<N> {
+    fn default() -> Self {
+        Texel { cover: [0.0; SHARES], values: [0.0; N] }
+    }
+}
+
+impl<const N: usize> Texel<N> {
     /// This texel over one of a slice below.
-    pub fn over(&self, below: &Texel) -> Texel {
+    pub fn over(&self, below: &Self) -> Self {
         let through = 1.0 - self.cover[SHARES - 1];
         Texel {
             cover: std::array::from_fn(|k| self.cover[k] + (1.0 - self.cover[k]) * below.cover[k]),
@@ -44,21 +51,21 @@ impl Texel {
 
 /// Slices of one tile; by slice from the ground up, row from the south, and column.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Slices {
+pub struct Slices<const N: usize = VALUES> {
     /// Texels a side.
     pub side: usize,
     /// The texels.
-    pub texels: Vec<Texel>,
+    pub texels: Vec<Texel<N>>,
     /// What all slices together hide of each texel's ground from straight above, at each of the shares of the density.
     pub above: Vec<[f32; SHARES]>,
 }
 
-impl Slices {
+impl<const N: usize> Slices<N> {
     /// Half as many slices: each two that are neighbours, the upper over the lower.
-    pub fn merged(&self) -> Slices {
+    pub fn merged(&self) -> Self {
         let size = self.side * self.side;
         let pairs = self.texels.chunks_exact(2 * size);
-        let merge = |pair: &[Texel]| {
+        let merge = |pair: &[Texel<N>]| {
             let (low, high) = pair.split_at(size);
             high.iter().zip(low).map(|(h, l)| h.over(l)).collect::<Vec<_>>()
         };
@@ -66,7 +73,7 @@ impl Slices {
     }
 
     /// The same with covers that hide together what the stack hides from straight above.
-    pub fn fitted(mut self) -> Slices {
+    pub fn fitted(mut self) -> Self {
         let size = self.side * self.side;
         for (k, shares) in self.above.iter().enumerate() {
             for (share, above) in shares.iter().enumerate() {
@@ -90,9 +97,9 @@ impl Slices {
     }
 
     /// The next mip: means of two by two texels of each slice.
-    pub fn halved(&self) -> Slices {
+    pub fn halved(&self) -> Self {
         let side = self.side / 2;
-        let mean = |of: [Texel; 4]| Texel {
+        let mean = |of: [Texel<N>; 4]| Texel {
             cover: std::array::from_fn(|k| 0.25 * of.iter().map(|t| t.cover[k]).sum::<f32>()),
             values: std::array::from_fn(|k| 0.25 * of.iter().map(|t| t.values[k]).sum::<f32>()),
         };

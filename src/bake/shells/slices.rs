@@ -24,7 +24,7 @@ pub struct Kind {
     /// Whether each face is a leaf, and not bark.
     pub leaf: Vec<bool>,
     /// Corners of each face, m about the trunk's base.
-    corners: Vec<[Vec3; 3]>,
+    pub(super) corners: Vec<[Vec3; 3]>,
     /// How far the tree reaches from its trunk, m.
     pub reach: f32,
     /// How high it is, m.
@@ -172,6 +172,30 @@ impl Samples {
             cover[least..].iter_mut().for_each(|c| *c += part);
         }
         above
+    }
+
+    /// What is seen of blocks of so many texels a side: of each slab, and block by row from the south and column, the samples that see a tree,
+    /// and where, m. Blocks that see none are left out.
+    pub fn blocks(&self, texels: u32, mut visit: impl FnMut(u32, [u32; 2], &[(Vec3, Seen)])) {
+        let w = self.window;
+        let (side, [columns, rows]) = (texels * SAMPLES, w.size.map(|n| n * SAMPLES));
+        let mut seen = Vec::with_capacity((side * side) as usize);
+        for (slab, y) in (0..w.slices).flat_map(|slab| (0..rows / side).map(move |y| (slab, y))) {
+            for x in 0..columns / side {
+                seen.clear();
+                for (v, u) in (0..side).flat_map(|v| (0..side).map(move |u| (y * side + v, x * side + u))) {
+                    let sample = self.seen[((slab * rows + v) * columns + u) as usize];
+                    if sample.tree != NONE {
+                        let across = Vec2::new(u as f32 + 0.5, v as f32 + 0.5) * (w.texel / SAMPLES as f32);
+                        let up = sample.height * (w.height / w.slices as f32);
+                        seen.push(((w.low + across).extend(up), sample));
+                    }
+                }
+                if !seen.is_empty() {
+                    visit(slab, [x, y], &seen);
+                }
+            }
+        }
     }
 
     fn index(&self, height: f32, x: u32, y: u32) -> usize {

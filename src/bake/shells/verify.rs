@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::coarse::{Coarse, coarse};
 use super::edges::{Near, edges};
+use super::lit::{Lit, lit};
 use super::march::{MARCHES, March, Stack};
 use super::seams::{Seam, seams};
 use super::slices::SHARES;
@@ -26,6 +27,8 @@ use crate::scene::Scene;
 pub(super) const BLOCK: i32 = 4;
 /// The lowest view, degrees from the zenith.
 const LOWEST: f64 = 80.0;
+/// So many rays for the ground are asked for each texel whose light is looked at, by some ten thousand rays.
+const RAYS_A_TEXEL: u32 = 100;
 /// Shares of the full density that are looked at.
 pub(super) const DENSITIES: [f64; 2] = [1.0, 0.5];
 
@@ -66,6 +69,8 @@ pub struct Verified {
     pub edges: Vec<Near>,
     /// Cover by merged slices and mips.
     pub coarse: Vec<Coarse>,
+    /// Light on what the finest slices show, at full density.
+    pub light: Vec<Lit>,
     /// Tiles side by side, at each share of the full density.
     pub seams: [Seam; SHARES],
 }
@@ -83,6 +88,7 @@ pub fn verify(scene: &Scene, shells: &Shells, directions: u32, points: u32) -> R
     Ok(Verified {
         angles: angles(scene, shells, &truth, (directions, points)),
         coarse: coarse(scene, shells, &truth, points),
+        light: lit(scene, shells, &forest, points.div_ceil(RAYS_A_TEXEL))?,
         edges: edges(scene, shells, &forest, 4 * points)?,
         seams: seams(shells),
     })

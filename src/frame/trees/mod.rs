@@ -3,5 +3,6 @@
 pub mod cards;
 pub mod meshes;
 pub mod shader_map;
+pub mod shells;
 pub mod tiles;
 pub mod zfield;

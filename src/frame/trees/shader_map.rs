@@ -33,6 +33,7 @@ impl ShaderMap {
                     ("TABLE_DENSITIES", float(forest.tables.densities)),
                     ("PAIR_TABLES", u32::from(plan.pair_tables)),
                     ("INDIRECT", u32::from(plan.indirect > 0)),
+                    ("SHOWS_TREES", u32::from(!plan.shells)),
                     ("INDIRECT_FIRST", IndirectData::first_species(plan)),
                 ],
             )?,

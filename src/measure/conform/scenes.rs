@@ -31,7 +31,7 @@ pub struct SceneCase {
     wind: f64,
     knobs: &'static [(&'static str, f64)],
     pub mode: ViewMode,
-    /// The ladder, where near trees are meshes or clouds of cards, which compute tiles alone draw; else empty, and that of BN12.
+    /// The ladder, where trees are meshes, clouds of cards or slices, which compute tiles alone draw; else empty, and that of BN12.
     near: &'static str,
 }
 
@@ -79,6 +79,12 @@ const ALL_RUNGS: &str = "mesh:48,cards:24,zfield:6,shader-map";
 const FEW_CARDS: &[(&str, f64)] = &[("cards", 30.0), ("card_atlas", 256.0), ("cloud_min_pixels", 24.0)];
 /// The same grove by clouds of cards.
 const CARDS: SceneCase = SceneCase { name: "cards", near: CARD_LADDER, knobs: FEW_CARDS, ..GROVE };
+/// Slices of a forest behind z-fields.
+const SHELL_LADDER: &str = "zfield:12,shells";
+/// Few and coarse ones.
+const FEW_SLICES: &[(&str, f64)] = &[("shell_slices", 8.0), ("shell_texels", 32.0)];
+/// Hills whose far trees are slices.
+const SHELLS: SceneCase = SceneCase { name: "shells", near: SHELL_LADDER, knobs: FEW_SLICES, ..HILLS };
 /// The whole forest by the shader-map.
 const FAR: &[(&str, f64)] = &[("zfield_min_pixels", 64.0)];
 
@@ -136,6 +142,36 @@ pub const ALL: &[SceneCase] = &[
         knobs: &[("cards", 30.0), ("card_atlas", 256.0), ("samples", 1.0)],
         ..CARDS
     },
+    SHELLS,
+    // Slices from straight above, and many trees one by one that hand over to them.
+    SceneCase { name: "shells-above", near: SHELL_LADDER, knobs: FEW_SLICES, ..ABOVE },
+    // The eye is below all slices but the lowest, and there is nothing else.
+    SceneCase {
+        name: "shells-inside",
+        camera: ([600.0, 600.0, 3.0], [640.0, 590.0, 6.0], 80.0),
+        near: "shells",
+        knobs: FEW_SLICES,
+        ..GROVE
+    },
+    SceneCase { name: "shells-sunset", sun: [120.0, -0.5, 1.0], ..SHELLS },
+    SceneCase { name: "shells-windy", wind: 15.0, ..SHELLS },
+    SceneCase {
+        name: "shells-all-orders",
+        knobs: &[("shell_slices", 8.0), ("shell_texels", 32.0), ("indirect", 1.0)],
+        ..SHELLS
+    },
+    SceneCase {
+        name: "shells-one-sample",
+        knobs: &[("shell_slices", 8.0), ("shell_texels", 32.0), ("samples", 1.0)],
+        ..SHELLS
+    },
+    SceneCase {
+        name: "cards-shells",
+        near: "mesh:48,cards:16,shells",
+        knobs: &[("cards", 30.0), ("card_atlas", 256.0), ("shell_slices", 8.0), ("shell_texels", 32.0)],
+        ..HILLS
+    },
+    SceneCase { name: "shells-lod", near: SHELL_LADDER, mode: ViewMode::Lod, ..SHELLS },
     SceneCase { name: "all-rungs", near: ALL_RUNGS, ..CARDS },
     SceneCase { name: "all-rungs-lod", near: ALL_RUNGS, mode: ViewMode::Lod, ..CARDS },
     SceneCase { name: "mode-fractions", mode: ViewMode::Fractions, ..GROVE },

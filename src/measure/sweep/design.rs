@@ -103,11 +103,13 @@ pub fn knobs(named: &[String]) -> Result<Vec<Swept>> {
     named.iter().map(find).collect()
 }
 
-/// Those of them that any of some ladders draws by: cards' are for ladders with cards.
+/// Those of them that any of some ladders draws by: cards' are for ladders with cards, shells' for ladders with shells.
 pub fn used_by(knobs: Vec<Swept>, ladders: &[Ladder]) -> Vec<Swept> {
     let cards = ladders.iter().any(Ladder::cards);
+    let shells = ladders.iter().any(Ladder::shells);
     let of_cards = |s: &Swept| s.knob.name.starts_with("card") || s.knob.name.starts_with("cloud");
-    knobs.into_iter().filter(|s| cards || !of_cards(s)).collect()
+    let of_shells = |s: &Swept| s.knob.name.starts_with("shell");
+    knobs.into_iter().filter(|s| (cards || !of_cards(s)) && (shells || !of_shells(s))).collect()
 }
 
 /// Presets, [`HOME`] first; then each knob's values below and above that of each preset, [`HOME`]'s first. `bases` are the

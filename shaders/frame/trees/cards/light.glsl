@@ -110,7 +110,7 @@ Shown shade(uint what, vec3 world) {
 
 bool is_mine(uint what) { return is_card(what); }
 // The light of the ground and of meshes is there before.
-bool is_stored(uint what) { return !is_card(what); }
-uint tree_seen(uint what) { return card_tree(what); }
+bool is_stored(uint what) { return !is_card(what) && !is_shell(what); }
+uint species_seen(uint what) { return 1u + species_row(texelFetch(trees, int(card_tree(what)) * 8 + 1).z); }
 
 #include "frame/trees/near_pixels.glsl"

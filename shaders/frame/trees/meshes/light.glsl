@@ -148,6 +148,6 @@ Shown shade(uint what, vec3 world) {
 bool is_mine(uint what) { return is_mesh(what); }
 // The ground's light is there before.
 bool is_stored(uint what) { return is_ground(what); }
-uint tree_seen(uint what) { return mesh_trees.items[seen_tree(what)].tree; }
+uint species_seen(uint what) { return 1u + species_row(texelFetch(trees, int(mesh_trees.items[seen_tree(what)].tree) * 8 + 1).z); }
 
 #include "frame/trees/near_pixels.glsl"

@@ -1,0 +1,5 @@
+// Slices of a forest where they are seen, of several samples a pixel: radiance, or a view mode.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "interface.glsl"
+#include "frame/trees/shells/light.glsl"

@@ -1,0 +1,7 @@
+// Slices of a forest where they are seen, of one sample a pixel: parts of the light apart.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#define LAYERS
+#define SINGLE
+#include "interface.glsl"
+#include "frame/trees/shells/light.glsl"
