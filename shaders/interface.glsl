@@ -10,6 +10,7 @@ const uint SHADOW_PAGES = 64u;        // pages along a side of a shadow cascade:
 const float SHADOW_DEPTHS = 16.0;     // depth range of a cascade over its width
 const uint SHADOW_CELLS = 8u;         // mesh cells along a side of a square of ground that casts
 const uint TERRAIN_CELLS = 32u;       // mesh cells along a side of a terrain quad
+const float SHELL_ROOM = 0.75;         // part of the distance from which on there are slices from which on they are looked for: a mesh cell spans less
 const uint SHELL_CELLS = 8u;          // mesh cells along a side of a slice of forest over a terrain quad
 const uint TERRAIN_HEIGHTS = 33u;     // height samples along a side of a terrain tile
 const uint FOREST_NODES = 17u;        // shader-map nodes along a side of a terrain quad: every second vertex
@@ -324,7 +325,6 @@ struct ShellTable {
     uint slices;                      // of the finest stack
     uint texels;                      // along a side of a tile
     uint seed;                        // of the scene
-    uint species_count;               // of the scene
 };
 
 // What lighting shells takes.

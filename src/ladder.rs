@@ -78,15 +78,13 @@ impl Default for Ladder {
 impl Ladder {
     /// What scenes have that say nothing: all rungs, and no meshes where the rasteriser, the device or the memory does not take them.
     pub const AUTO: Ladder =
-        Ladder { steps: steps([Some(Rung::Mesh), Some(Rung::ZField), Some(Rung::ShaderMap)]), yields: true };
+        Ladder { steps: steps(&[Rung::Mesh, Rung::ZField, Rung::ShaderMap]), yields: true };
     /// z-fields near, the shader-map far (BN12).
-    pub const BN12: Ladder =
-        Ladder { steps: steps([Some(Rung::ZField), Some(Rung::ShaderMap), None]), yields: false };
+    pub const BN12: Ladder = Ladder { steps: steps(&[Rung::ZField, Rung::ShaderMap]), yields: false };
     /// z-fields at any distance.
-    pub const ZFIELD: Ladder = Ladder { steps: steps([Some(Rung::ZField), None, None]), yields: false };
+    pub const ZFIELD: Ladder = Ladder { steps: steps(&[Rung::ZField]), yields: false };
     /// The shader-map at any distance.
-    pub const SHADER_MAP: Ladder =
-        Ladder { steps: steps([Some(Rung::ShaderMap), None, None]), yields: false };
+    pub const SHADER_MAP: Ladder = Ladder { steps: steps(&[Rung::ShaderMap]), yields: false };
 
     /// Ladders that have a name of their own.
     pub const SHORTHANDS: [(&'static str, Ladder); 3] =
@@ -221,13 +219,11 @@ impl Ladder {
 }
 
 /// Steps of these rungs, none of which says a height.
-const fn steps(rungs: [Option<Rung>; 3]) -> [Option<Step>; RUNGS] {
+const fn steps(rungs: &[Rung]) -> [Option<Step>; RUNGS] {
     let mut steps = [None; RUNGS];
     let mut k = 0;
     while k < rungs.len() {
-        if let Some(rung) = rungs[k] {
-            steps[k] = Some(Step { rung, pixels: None });
-        }
+        steps[k] = Some(Step { rung: rungs[k], pixels: None });
         k += 1;
     }
     steps

@@ -9,10 +9,11 @@ float relative_distance(float distance, float range) { return range > 0.0 ? dist
 float converged(float relative, float end) { return end > 0.0 ? smoothstep(0.0, end, relative) : 0.0; }
 
 // Share of the trees that the shader-map shows: mean of 1 - tree_fade over u.
-float handed_over(float relative) {
-    float t = clamp((relative - HANDOVER_FROM) * HANDOVER_RATE, 0.0, 1.0);
-    return t < 0.5 ? 2.0 * t * t : 1.0 - 2.0 * (1.0 - t) * (1.0 - t);
+vec4 handed_over(vec4 relative) {
+    vec4 t = clamp((relative - HANDOVER_FROM) * HANDOVER_RATE, 0.0, 1.0);
+    return mix(1.0 - 2.0 * (1.0 - t) * (1.0 - t), 2.0 * t * t, lessThan(t, vec4(0.5)));
 }
+float handed_over(float relative) { return handed_over(vec4(relative)).x; }
 
 // Relative distance at which one tree has faded out; each does so at a time of its own, u in [0, 1). `precise` lets the
 // CPU's twin of the cull agree to the bit.

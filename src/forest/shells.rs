@@ -2,19 +2,18 @@
 
 use super::species::mean_area;
 use crate::bake::Baked;
-use crate::bake::shells::{FREE_RANGE, LIGHT_IMAGES, LIGHT_TEXELS, Shells};
+use crate::bake::shells::{FREE_RANGE, Shells};
 use crate::gpu::interface::{COVER_GROUPS, FREE_SCALE, MAX_SPECIES, ShellTable};
 use crate::gpu::{Buffer, Gpu, Image};
 use crate::land::pattern::TILES;
 use crate::plan::names::resource;
-use crate::plan::{Plan, SHELL_LIGHT_TEXELS, SHELL_LIGHTS};
+use crate::plan::{Plan, SHELL_LIGHTS};
 use crate::scene::Scene;
 use crate::{Error, Result};
 
 /// Layers of four channels.
 const GROUPS: usize = COVER_GROUPS as usize;
 const _: () = assert!(GROUPS * 4 > MAX_SPECIES as usize);
-const _: () = assert!(SHELL_LIGHTS == LIGHT_IMAGES && SHELL_LIGHT_TEXELS == LIGHT_TEXELS);
 const _: () = assert!(FREE_SCALE == FREE_RANGE as f32);
 
 /// What slices are drawn from.
@@ -124,7 +123,6 @@ fn content(scene: &Scene, baked: &[Baked], shells: &Shells) -> ShellTable {
         slices: shells.settings.slices,
         texels: shells.settings.texels,
         seed: scene.seed,
-        species_count: scene.species.len() as u32,
         ..bytemuck::Zeroable::zeroed()
     }
 }

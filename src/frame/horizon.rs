@@ -2,7 +2,7 @@
 //! trees there are drawn one by one, and there is no such pass ([`Plan::horizon`]).
 
 use super::Forest;
-use super::targets::ImageTargets;
+use super::targets::{ImageTargets, build_of};
 use super::trees::shader_map::ShaderMap;
 use crate::Result;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
@@ -29,12 +29,12 @@ impl Horizon {
         if !plan.horizon() {
             return Ok(None);
         }
-        let shader = match (plan.layers, plan.samples > 1) {
-            (false, true) => &shaders::FRAME_HORIZON_COMP,
-            (false, false) => &shaders::FRAME_HORIZON_SINGLE_COMP,
-            (true, true) => &shaders::FRAME_HORIZON_LAYERS_COMP,
-            (true, false) => &shaders::FRAME_HORIZON_LAYERS_SINGLE_COMP,
-        };
+        let builds = [
+            &shaders::FRAME_HORIZON_COMP,
+            &shaders::FRAME_HORIZON_SINGLE_COMP,
+            &shaders::FRAME_HORIZON_LAYERS_COMP,
+            &shaders::FRAME_HORIZON_LAYERS_SINGLE_COMP,
+        ];
         let image = matches!(scene.sky, Sky::LatLong { .. });
         let constants = [
             ("COVER_CHANNELS", plan.cover_channels),
@@ -44,7 +44,7 @@ impl Horizon {
             ("WIND", u32::from(plan.wind)),
         ];
         let tiles = plan.size.map(|n| n.div_ceil(TILE_SIDE));
-        Ok(Some(Horizon { program: gpu.compute(shader, &constants)?, tiles, clears: !image }))
+        Ok(Some(Horizon { program: gpu.compute(build_of(plan, builds), &constants)?, tiles, clears: !image }))
     }
 
     /// Records the pass of a frame in which no tree is of the shader-map: the sky alone, of this radiance if it is uniform.

@@ -3,7 +3,7 @@
 
 use super::Forest;
 use super::ground::NoTrees;
-use super::targets::ImageTargets;
+use super::targets::{ImageTargets, build_of};
 use super::trees::shader_map::ShaderMap;
 use crate::Result;
 use crate::forest::terrain::{TerrainData, TerrainDraws};
@@ -30,12 +30,12 @@ impl SeenGround {
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
-        let light = match (plan.layers, plan.samples > 1) {
-            (false, true) => &shaders::FRAME_GROUND_COMP,
-            (false, false) => &shaders::FRAME_GROUND_SINGLE_COMP,
-            (true, true) => &shaders::FRAME_GROUND_LAYERS_COMP,
-            (true, false) => &shaders::FRAME_GROUND_LAYERS_SINGLE_COMP,
-        };
+        let builds = [
+            &shaders::FRAME_GROUND_COMP,
+            &shaders::FRAME_GROUND_SINGLE_COMP,
+            &shaders::FRAME_GROUND_LAYERS_COMP,
+            &shaders::FRAME_GROUND_LAYERS_SINGLE_COMP,
+        ];
         Ok(SeenGround {
             mesh: gpu.graphics(&GraphicsDesc {
                 vert: &shaders::FRAME_TERRAIN_SEEN_VERT,
@@ -46,7 +46,7 @@ impl SeenGround {
                 constants: &[],
             })?,
             light: gpu.compute(
-                light,
+                build_of(plan, builds),
                 &[
                     ("COVER_CHANNELS", plan.cover_channels),
                     ("COVER_SIDE", plan.coverage_size),

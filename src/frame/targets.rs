@@ -3,7 +3,7 @@
 use half::f16;
 
 use crate::camera::NEAR_PLANE;
-use crate::gpu::{Attachment, Buffer, Gpu, Image, Resource};
+use crate::gpu::{Attachment, Buffer, Gpu, Image, Resource, Shader};
 use crate::image::{Linear, Picture};
 use crate::plan::Plan;
 use crate::plan::names::resource;
@@ -37,6 +37,11 @@ impl ColorTarget {
             None => Attachment { image: &self.image, resolve: None, clear },
         }
     }
+}
+
+/// Of a shader's builds the one that draws to what a plan lists: that of several samples a pixel, that of one, and both again for layers apart.
+pub fn build_of(plan: &Plan, builds: [&'static Shader; 4]) -> &'static Shader {
+    builds[2 * usize::from(plan.layers) + usize::from(plan.samples == 1)]
 }
 
 /// All targets of a plan.

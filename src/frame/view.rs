@@ -6,7 +6,6 @@ use crate::camera::{Cascade, Eye, Light};
 use crate::forest::cull::bin_end;
 use crate::forest::seeds::SeedData;
 use crate::gpu::interface::{DISTANCE_BINS, View};
-use crate::land::candidate::Layout;
 use crate::physics::wind::Motion;
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -69,10 +68,8 @@ pub fn view(
     if let Some(seeds) = seeds {
         view.quad_offset = seeds.camera_quad(eye).1.map(|v| v as f32);
     }
-    if let Some(layout) = Layout::new(scene).filter(|_| plan.shells) {
-        (view.wang_camera, view.wang_offset) = split(ground, layout.tile_side);
-        view.wang_offset = view.wang_offset.map(|v| (f64::from(v) / layout.tile_side) as f32);
-    }
+    (view.wang_camera, view.wang_offset) = split(ground, plan.tile_side);
+    view.wang_offset = view.wang_offset.map(|v| (f64::from(v) / plan.tile_side) as f32);
     let scaled = |c: [f64; 3]| c.map(|v| (v * light.scale) as f32);
     view.sun_direction = light.direction.map(|v| v as f32);
     view.cascade_count = cascades.len() as u32;

@@ -9,9 +9,10 @@ use crate::land::pattern::TILES;
 use crate::scene::{Distribution, Scene};
 use crate::{Error, Result};
 
-/// By how much texels of light on shells are larger than those of what is seen: light changes with crowns, and they are metres wide.
+/// Texels of cover along a side of one of light on shells: 4 × 4 texels have 256 samples a slice, enough for a mean transfer and for rays from places
+/// of their own; and neighbouring crowns, some metres wide, are still told apart where a tile is 76 m.
 pub const SHELL_LIGHT_TEXELS: u32 = 4;
-/// Images of light on shells.
+/// Images of light on shells, of four numbers each.
 pub const SHELL_LIGHTS: usize = 7;
 
 impl Plan {

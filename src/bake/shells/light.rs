@@ -29,14 +29,10 @@ use crate::bake::harmonics::{self, Transfer};
 use crate::bake::least_squares::solve;
 use crate::physics::harmonics::{KEPT, RANGE, encode, evaluate, turned};
 use crate::physics::hash::{hash2, unit};
+pub use crate::plan::{SHELL_LIGHT_TEXELS as LIGHT_TEXELS, SHELL_LIGHTS as LIGHT_IMAGES};
 use crate::rays::Stack;
 use crate::scene::{Mesh, Scene};
 
-/// Texels of cover along a side of one of light: 4 × 4 texels have 256 samples a slice, enough for a mean transfer and for rays from places of
-/// their own; and neighbouring crowns, some metres wide, are still told apart where a tile is 76 m.
-pub const LIGHT_TEXELS: u32 = 4;
-/// Images of four numbers each.
-pub const LIGHT_IMAGES: usize = 7;
 /// Numbers of a texel: transfer to the side that is seen and to the other, V, and how much of the sky the other trees leave.
 pub const LIGHT: usize = 3 * KEPT + 1;
 /// What the byte 127 means of a number of V. Where all is free the first one is √(4π): 64 to the byte, without rounding.

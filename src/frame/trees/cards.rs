@@ -7,7 +7,7 @@ use crate::forest::cards::CardData;
 use crate::forest::cull::CullData;
 use crate::forest::forest_sky::ForestSky;
 use crate::frame::Forest;
-use crate::frame::targets::ImageTargets;
+use crate::frame::targets::{ImageTargets, build_of};
 use crate::gpu::interface::{CardKind, CardLightParameters, CardParameters, PlainDraw, TILE_SIDE};
 use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Image, Later, Layers, Program, Recorder, Resource, Sampler,
@@ -35,12 +35,12 @@ impl Cards {
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, (cull, data): (&CullData, &CardData)) -> Result<Self> {
-        let light = match (plan.layers, plan.samples > 1) {
-            (false, true) => &shaders::FRAME_TREES_CARDS_LIGHT_COMP,
-            (false, false) => &shaders::FRAME_TREES_CARDS_LIGHT_SINGLE_COMP,
-            (true, true) => &shaders::FRAME_TREES_CARDS_LIGHT_LAYERS_COMP,
-            (true, false) => &shaders::FRAME_TREES_CARDS_LIGHT_LAYERS_SINGLE_COMP,
-        };
+        let builds = [
+            &shaders::FRAME_TREES_CARDS_LIGHT_COMP,
+            &shaders::FRAME_TREES_CARDS_LIGHT_SINGLE_COMP,
+            &shaders::FRAME_TREES_CARDS_LIGHT_LAYERS_COMP,
+            &shaders::FRAME_TREES_CARDS_LIGHT_LAYERS_SINGLE_COMP,
+        ];
         Ok(Cards {
             list: gpu.compute(&shaders::FRAME_TREES_CARDS_LIST_COMP, &[])?,
             draw: gpu.graphics(&GraphicsDesc {
@@ -52,7 +52,7 @@ impl Cards {
                 constants: &[("SAMPLES", plan.samples), ("WIND", u32::from(plan.wind))],
             })?,
             light: gpu.compute(
-                light,
+                build_of(plan, builds),
                 &[
                     ("SAMPLES", plan.samples),
                     ("HAS_SUN", u32::from(plan.sun)),

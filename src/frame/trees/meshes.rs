@@ -4,7 +4,7 @@ use crate::forest::cull::CullData;
 use crate::forest::forest_sky::ForestSky;
 use crate::forest::meshes::MeshData;
 use crate::frame::Forest;
-use crate::frame::targets::ImageTargets;
+use crate::frame::targets::{ImageTargets, build_of};
 use crate::gpu::interface::{
     DrawCommand, HIDING_STEPS, MESH_DRAWS, MESH_TREES, MeshKind, MeshLightParameters, MeshParameters,
     TILE_SIDE,
@@ -39,12 +39,12 @@ impl Meshes {
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, data: &MeshData) -> Result<Self> {
-        let light = match (plan.layers, plan.samples > 1) {
-            (false, true) => &shaders::FRAME_TREES_MESHES_LIGHT_COMP,
-            (false, false) => &shaders::FRAME_TREES_MESHES_LIGHT_SINGLE_COMP,
-            (true, true) => &shaders::FRAME_TREES_MESHES_LIGHT_LAYERS_COMP,
-            (true, false) => &shaders::FRAME_TREES_MESHES_LIGHT_LAYERS_SINGLE_COMP,
-        };
+        let builds = [
+            &shaders::FRAME_TREES_MESHES_LIGHT_COMP,
+            &shaders::FRAME_TREES_MESHES_LIGHT_SINGLE_COMP,
+            &shaders::FRAME_TREES_MESHES_LIGHT_LAYERS_COMP,
+            &shaders::FRAME_TREES_MESHES_LIGHT_LAYERS_SINGLE_COMP,
+        ];
         Ok(Meshes {
             list: gpu.compute(&shaders::FRAME_TREES_MESHES_LIST_COMP, &[])?,
             draw: gpu.graphics(&GraphicsDesc {
@@ -56,7 +56,7 @@ impl Meshes {
                 constants: &[("SAMPLES", plan.samples), ("WIND", u32::from(plan.wind))],
             })?,
             light: gpu.compute(
-                light,
+                build_of(plan, builds),
                 &[
                     ("SAMPLES", plan.samples),
                     ("HAS_SUN", u32::from(plan.sun)),

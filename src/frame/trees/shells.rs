@@ -9,9 +9,9 @@ use crate::forest::indirect::IndirectData;
 use crate::forest::shells::ShellData;
 use crate::forest::terrain::TerrainDraws;
 use crate::frame::ground::mesh_indices;
-use crate::frame::targets::ImageTargets;
+use crate::frame::targets::{ImageTargets, build_of};
 use crate::frame::world::{Forest, World};
-use crate::gpu::interface::{NO_PAGE, SHELL_CELLS, ShellLightParameters, TILE_SIDE};
+use crate::gpu::interface::{NO_PAGE, SHELL_CELLS, SHELL_ROOM, ShellLightParameters, TILE_SIDE};
 use crate::gpu::{
     Buffer, DepthTest, Gpu, GraphicsDesc, Layers, Program, Recorder, Resource, Sampler, Targets, shaders, vk,
 };
@@ -42,12 +42,12 @@ impl Shells {
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, data: &ShellData) -> Result<Self> {
-        let light = match (plan.layers, plan.samples > 1) {
-            (false, true) => &shaders::FRAME_TREES_SHELLS_LIGHT_COMP,
-            (false, false) => &shaders::FRAME_TREES_SHELLS_LIGHT_SINGLE_COMP,
-            (true, true) => &shaders::FRAME_TREES_SHELLS_LIGHT_LAYERS_COMP,
-            (true, false) => &shaders::FRAME_TREES_SHELLS_LIGHT_LAYERS_SINGLE_COMP,
-        };
+        let builds = [
+            &shaders::FRAME_TREES_SHELLS_LIGHT_COMP,
+            &shaders::FRAME_TREES_SHELLS_LIGHT_SINGLE_COMP,
+            &shaders::FRAME_TREES_SHELLS_LIGHT_LAYERS_COMP,
+            &shaders::FRAME_TREES_SHELLS_LIGHT_LAYERS_SINGLE_COMP,
+        ];
         Ok(Shells {
             draw: gpu.graphics(&GraphicsDesc {
                 vert: &shaders::FRAME_TREES_SHELLS_SHELL_VERT,
@@ -63,7 +63,7 @@ impl Shells {
                 ],
             })?,
             light: gpu.compute(
-                light,
+                build_of(plan, builds),
                 &[
                     ("SAMPLES", plan.samples),
                     ("COVER_CHANNELS", plan.cover_channels),
@@ -114,7 +114,7 @@ impl Shells {
                 if drawn.cover_layer == NO_PAGE || terrain.tree.farthest(*key, eye.position) < self.from {
                     continue;
                 }
-                let nearest = terrain.tree.nearest(*key, eye.position).max(0.75 * self.from);
+                let nearest = terrain.tree.nearest(*key, eye.position).max(f64::from(SHELL_ROOM) * self.from);
                 let slices = data.slices(nearest, eye.pixels_at_1m / self.spread);
                 let first = (quad << CODE_BITS) + slices;
                 pass.draw_indexed(&self.indices, 6 * SHELL_CELLS * SHELL_CELLS, first..first + slices);

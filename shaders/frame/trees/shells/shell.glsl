@@ -65,9 +65,7 @@ float shell_share(vec4 channels[COVER_GROUPS], float distance) {
     float share = 0.0;
     for (uint g = 0u; 4u * g < COVER_CHANNELS; g++) {
         vec4 relative = mix(vec4(1.0), distance * table.t.nearness[g], greaterThan(table.t.nearness[g], vec4(0.0)));
-        vec4 t = clamp((relative - HANDOVER_FROM) * HANDOVER_RATE, 0.0, 1.0), far = 1.0 - t;
-        vec4 handed = mix(1.0 - 2.0 * far * far, 2.0 * t * t, lessThan(t, vec4(0.5)));
-        share += dot(channels[g] * table.t.shares[g], handed);
+        share += dot(channels[g] * table.t.shares[g], handed_over(relative));
     }
     return clamp(share, 0.0, 1.0);
 }

@@ -33,5 +33,5 @@ void main() {
     gl_Position = view.v.clip_from_world * vec4(position, 1.0);
     // What shows nothing all around is before the near plane: slices that others show there, and what is so near that trees stand one by one.
     bool shown = shell_shows(code, shell_stack(detail + ROOM, code));
-    if (!shown || far < 0.75 * table.t.begin) gl_Position.z = 2.0 * gl_Position.w;
+    if (!shown || far < SHELL_ROOM * table.t.begin) gl_Position.z = 2.0 * gl_Position.w;
 }
