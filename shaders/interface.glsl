@@ -38,6 +38,7 @@ const uint CARD_LEVELS = 4u;          // levels of detail of pictures of cards
 const uint SKY_STEPS = 16u;           // steps of the height, and of the thickness of crowns around, for which the sky of a forest is known
 const float TRANSFER_SCALE = 1.024;    // of coefficients of light transfer as they are stored, -1 to 1
 const float FREE_SCALE = 7.0344262;       // of coefficients of what other trees leave of a direction, as shells store them, -1 to 1
+const uint OPTICS = 27u;              // vectors a species: reflectance and transmittance of leaves, bark; of each of two forms twelve of what harmonics leave out of the sun
 const uint LEAF_OCTAVES = 7u;         // shares of the leaves at which the pull on their cards is known: 1, 1/2, 1/4 and so on
 const float LEAST_SHARE = 0.015625;   // the last of them
 const float FADE_BAND = 0.1;          // half the width of the band of ranks in which cards fade, over u (1 - u)

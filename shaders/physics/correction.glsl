@@ -10,6 +10,14 @@ CorrectionTerms correction_terms(float view, float sun, float angle) {
     return CorrectionTerms(vec4(1.0, q, q * q, l), vec4(l * l, v, v * q, l * q));
 }
 
+// For light that is known at the surfaces themselves: hats of q about 0, 1/5, ... 1, and l, v.
+CorrectionTerms phase_terms(float view, float sun, float angle) {
+    float x = 5.0 * sqrt(angle * (1.0 / 3.141592653589793));
+    vec4 near = max(1.0 - abs(x - vec4(0.0, 1.0, 2.0, 3.0)), 0.0);
+    vec2 far = max(1.0 - abs(x - vec2(4.0, 5.0)), 0.0);
+    return CorrectionTerms(near, vec4(far, clamp(vec2(sun, view), 0.0, 1.0)));
+}
+
 // K as a line in the height z: its value at 0, and its slope; of the coefficients at the middle of the tree and of their change.
 vec2 correction_line(vec4 coefficients[4], CorrectionTerms y, float strength) {
     return vec2(1.0, 0.0) + strength * vec2(dot(coefficients[0], y.first) + dot(coefficients[1], y.second),

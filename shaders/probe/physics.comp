@@ -13,6 +13,7 @@
 #include "physics/tables.glsl"
 #include "physics/transfer.glsl"
 #include "physics/harmonics.glsl"
+#include "physics/correction.glsl"
 
 struct Arguments {
     uvec4 a;
@@ -93,6 +94,12 @@ void main() {
             uint at = i.a.w;
             r.a = floatBitsToUint(vec4(all[at], all[at + 1u], all[at + 2u], all[at + 3u]));
             r.b = floatBitsToUint(vec4(all[at + 4u], all[at + 5u], all[at + 6u], all[at + 7u]));
+            break;
+        }
+        case 19u: {
+            CorrectionTerms y = phase_terms(a.x, a.y, a.z);
+            r.a = floatBitsToUint(y.first);
+            r.b = floatBitsToUint(y.second);
             break;
         }
     }

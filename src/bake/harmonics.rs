@@ -9,10 +9,13 @@
 //! Of a light L = ∫ L(ω) Y dω these are irradiances: a viewer on the side of n sees the radiance (ρ front + τ back)·L/π of a leaf that
 //! reflects ρ and lets τ through, on the other side (ρ back + τ front)·L/π. Bark lets nothing through.
 //!
+//! What is seen of a crown is lit by another sun than these means say: [`seen`] corrects that.
+//!
 //! Rays are cast from places all over the face, through leaf masks, in directions spread by their cosines. A leaf does not hide itself
 //! (nor do the crossed parts of one), a face of bark neither; bark's back finds the inside of its branch.
 
-pub(super) mod file;
+pub(in crate::bake) mod file;
+pub mod seen;
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -44,6 +47,8 @@ pub struct Harmonics {
     pub faces: Vec<[Transfer; 2]>,
     /// What the tree hides of the sky from its neighbours' leaves, in [`SKY_DIRECTIONS`] directions ([`super::hiding::hiding`]).
     pub hiding: Vec<f64>,
+    /// What the sun does on what is seen of leaves and bark, over what the coefficients say.
+    pub seen: seen::Corrections,
 }
 
 impl Harmonics {
@@ -56,7 +61,8 @@ impl Harmonics {
         let faces = transfers(mesh, &surface, quiet);
         let rule = Directions::new(SKY_DIRECTIONS);
         let hiding = rule.map_or(Vec::new(), |rule| hiding(&surface, &Caster::new(&surface), &rule));
-        Ok(Harmonics { faces, hiding })
+        let seen = seen::measure(mesh, &surface, &faces);
+        Ok(Harmonics { faces, hiding, seen })
     }
 }
 
@@ -109,7 +115,7 @@ fn cosine_direction(normal: Vec3, k: u32, turn: f32) -> Vec3 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::physics::harmonics::{clamped_cosine, even_sky, irradiance, sun};
     use crate::scene::Material;
@@ -183,7 +189,7 @@ mod tests {
     }
 
     /// A ball of bark, of triangles whose corners are on it: convex, so that nothing hides its outside, and all its inside.
-    fn ball() -> Mesh {
+    pub(in crate::bake) fn ball() -> Mesh {
         let mut mesh = model();
         let (rings, sides) = (16, 32);
         let at = |i: u32, j: u32| {

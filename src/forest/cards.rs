@@ -3,6 +3,7 @@
 use super::species::optics_block;
 use crate::bake::Baked;
 use crate::bake::cards::{CardCloud, CloudCard, FAR};
+use crate::bake::harmonics::seen::Corrections;
 use crate::gpu::interface::{CARD_LEVELS, Card, CardKind, FAR_CARDS, TRANSFER_SCALE};
 use crate::gpu::{Buffer, Gpu, Image};
 use crate::physics::harmonics;
@@ -29,7 +30,7 @@ pub struct CardData {
     pub surfaces: Image,
     /// How light comes to that.
     pub transfers: Image,
-    /// Reflectance and transmittance of leaves, and reflectance of bark, of each species.
+    /// Reflectance and transmittance of leaves, and reflectance of bark, of each species, and what harmonics leave out of the sun there.
     pub optics: Buffer,
     /// Number of species.
     pub species: u32,
@@ -82,7 +83,7 @@ impl CardData {
             opacities,
             surfaces,
             transfers,
-            optics: gpu.buffer_with("leaf optics of cards", &optics_block(baked))?,
+            optics: gpu.buffer_with("leaf optics of cards", &optics_block(baked, seen))?,
             species: clouds.len() as u32,
             cloud_cards: clouds.iter().map(|c| c.full).max().unwrap_or(0),
         })
@@ -95,6 +96,11 @@ fn cloud(baked: &Baked, side: u32) -> Result<&CardCloud> {
     cloud.ok_or_else(|| {
         Error::Usage("a species was baked without the cloud of cards that the plan lists".into())
     })
+}
+
+/// What harmonics leave out of the sun on a species' full cloud and far form.
+fn seen(baked: &Baked) -> [Corrections; 2] {
+    baked.cards.as_ref().map(|c| c.seen).unwrap_or_default()
 }
 
 fn card(c: &CloudCard) -> Card {

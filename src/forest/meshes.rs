@@ -7,10 +7,12 @@ use half::f16;
 use crate::bake::Baked;
 use crate::bake::envelope::Envelopes;
 use crate::bake::harmonics::Harmonics;
+use crate::bake::harmonics::seen::Corrections;
 use crate::bake::levels::Levels;
 use crate::bake::surface::{Face, Mask, Surface};
 use crate::bake::turning::{Turning, packed_place, turning};
 use crate::forest::hidden_sky::HiddenSky;
+use crate::forest::species::optics_block;
 use crate::gpu::interface::{
     BARK_LEVELS, BARK_PIXELS, FADE_BAND, HIDING_STEPS, LEAF_OCTAVES, LEAST_SHARE, MESH_TRIANGLES, MeshFace,
     MeshKind, NO_PAGE,
@@ -60,7 +62,7 @@ pub struct MeshData {
     pub hiding: Buffer,
     /// Height to which those steps go, m.
     pub top: f32,
-    /// Reflectance and transmittance of leaves, and reflectance of bark, of each species.
+    /// Reflectance and transmittance of leaves, and reflectance of bark, of each species, and what harmonics leave out of the sun there.
     pub optics: Buffer,
     /// Number of species.
     pub species: u32,
@@ -164,11 +166,17 @@ impl MeshData {
                 false => gpu.described_buffer_with(&plan.buffer(resource::HIDING), &pairs)?,
             },
             top: top as f32,
-            optics: gpu.buffer_with("leaf optics", &super::species::optics_block(baked))?,
+            optics: gpu.buffer_with("leaf optics", &optics_block(baked, seen))?,
             species: all.kinds.len() as u32,
             power: rule.power as u32,
         })
     }
+}
+
+/// What harmonics leave out of the sun on a species' mesh, where they light it: its one form.
+fn seen(baked: &Baked) -> [Corrections; 2] {
+    let one = baked.harmonics.as_ref().map(|h| h.seen).unwrap_or_default();
+    [one, one]
 }
 
 impl Content {

@@ -1,7 +1,8 @@
 //! Species on the GPU: the table, the z-field views of all species in one array, view bases, masks and density maps.
 
-use crate::bake::{Baked, SpeciesBake, tables};
-use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, Species as Row, ViewBasis};
+use crate::bake::harmonics::seen::Corrections;
+use crate::bake::{Baked, tables};
+use crate::gpu::interface::{MAX_SPECIES, NO_PAGE, OPTICS, Species as Row, ViewBasis};
 use crate::gpu::{Buffer, Gpu, Image, ImageDesc, Resource, Sampler, vk};
 use crate::land::density::{DensityMap, HEIGHT_SOFTNESS, SLOPE_SOFTNESS, density_map};
 use crate::physics::correction::Correction;
@@ -238,13 +239,17 @@ pub(super) fn mean_squared_scale(species: &Species) -> f64 {
     }
 }
 
-/// Reflectance and transmittance of leaves, and reflectance of bark, of every species, as shaders read them.
-pub(super) fn optics_block(baked: &[Baked]) -> Vec<[f32; 4]> {
-    let of = |s: &SpeciesBake| {
-        [s.reflectance, s.transmittance, s.bark_reflectance].map(|[r, g, b]| [r, g, b, 0.0])
-    };
-    let mut block: Vec<[f32; 4]> = baked.iter().flat_map(|b| of(&b.species)).collect();
-    block.resize(3 * MAX_SPECIES as usize, [0.0; 4]);
+/// Reflectance and transmittance of leaves, and reflectance of bark, of every species, and what harmonics leave out of the sun on
+/// each of these in two forms of a tree, as shaders read them.
+pub(super) fn optics_block(baked: &[Baked], seen: impl Fn(&Baked) -> [Corrections; 2]) -> Vec<[f32; 4]> {
+    let mut block = Vec::new();
+    for one in baked {
+        let s = &one.species;
+        let colours = [s.reflectance, s.transmittance, s.bark_reflectance];
+        block.extend(colours.map(|[r, g, b]| [r, g, b, 0.0]));
+        block.extend(seen(one).iter().flatten().flat_map(coefficients));
+    }
+    block.resize((OPTICS * MAX_SPECIES) as usize, [0.0; 4]);
     block
 }
 

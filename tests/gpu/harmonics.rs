@@ -1,6 +1,6 @@
-//! Spherical harmonics on the device against their polynomials in f64.
+//! Spherical harmonics, and the terms of what they leave out of the sun, on the device against their twins in f64.
 
-use canopy::physics::harmonics;
+use canopy::physics::{correction, harmonics};
 
 use crate::device::{self, Function, Worst, evaluate, float, words};
 
@@ -39,4 +39,22 @@ fn harmonics_are_those_of_the_oracle() {
     }
     // Constants of eight digits, and five roundings of numbers of at most 3: 2e-6.
     worst.within(1e-5, "harmonics");
+}
+
+#[test]
+fn terms_of_the_phase_angle_are_those_of_the_oracle() {
+    let gpu = device::open();
+    let angles = (0..=180).map(|k| std::f32::consts::PI * k as f32 / 180.0);
+    let inputs: Vec<[f32; 3]> =
+        angles.flat_map(|a| [[0.3, 0.7, a], [-0.5, 0.2, a], [0.9, -0.1, a]]).collect();
+    let arguments: Vec<_> = inputs.iter().map(|i| words(i)).collect();
+    let mut worst = Worst::default();
+    for (input, out) in inputs.iter().zip(evaluate(&gpu, Function::PhaseTerms, &arguments)) {
+        let [view, sun, angle] = input.map(f64::from);
+        for (k, want) in correction::phase_terms(view, sun, angle).into_iter().enumerate() {
+            worst.note((float(&out, k) - want).abs(), || format!("{k} {input:?}"));
+        }
+    }
+    // A square root, and a difference of numbers of up to 5, each of a few roundings of 5: 1e-6.
+    worst.within(5e-6, "terms");
 }

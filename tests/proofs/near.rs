@@ -124,6 +124,8 @@ fn a_tree_as_cards_over_as_mesh() {
         let mut scene = trees(&[(name, &[[500.0, 500.0]])]);
         // One light for both, and no more than one bounce, which neither has from its own leaves.
         scene.settings.set("light_model", 1.0).unwrap();
+        // Whole: meshes of fewer leaves send 6 % less of a sun behind the viewer than whole ones and 4 % more of one before him.
+        scene.settings.set("leaf_pixels", 0.0).unwrap();
         let eyes = around(&scene, 128.0);
         let suns: Vec<Sun> = [20.0, 60.0]
             .into_iter()

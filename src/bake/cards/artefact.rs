@@ -6,8 +6,9 @@ use rayon::prelude::*;
 use super::atlas::{GUTTER, shelves};
 use super::paint::{Painted, texels_of};
 use super::picture::{LEVELS, Picture, Shown, padded};
-use super::{Card, CloudSettings, FLATNESS, clusters_for, parted};
+use super::{Card, CloudSettings, FLATNESS, clusters_for, parted, seen};
 use crate::bake::harmonics::Harmonics;
+use crate::bake::harmonics::seen::Corrections;
 use crate::bake::surface::Surface;
 use crate::scene::Mesh;
 use crate::{Error, Result};
@@ -59,6 +60,8 @@ pub struct CardCloud {
     /// falls on the side of the surface that this viewer sees, then as many of what falls on the other side (for leaves to let
     /// through), as [`crate::physics::harmonics::decode`] reads them. Means and fills likewise.
     pub harmonics: Vec<Vec<u8>>,
+    /// What the sun does on what is seen of the full cloud, and of the far form, over what these numbers say.
+    pub seen: [Corrections; 2],
 }
 
 impl CardCloud {
@@ -102,6 +105,7 @@ impl CardCloud {
         };
         cloud.cards = cards.iter().zip(&painted).enumerate().map(place).collect();
         cloud.full = full;
+        cloud.seen = seen::measure(mesh, &surface, light, &cloud);
         Ok(cloud)
     }
 

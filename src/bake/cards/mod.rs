@@ -14,6 +14,7 @@ pub(super) mod file;
 mod means;
 mod paint;
 mod picture;
+mod seen;
 mod verify;
 
 use glam::{Vec2, Vec3};

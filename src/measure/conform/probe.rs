@@ -35,6 +35,7 @@ pub enum Function {
     Transfer,
     MeshMask,
     Harmonics,
+    PhaseTerms,
 }
 
 /// The results of a function for many arguments.

@@ -6,6 +6,7 @@
 #include "physics/harmonics.glsl"
 #include "physics/forest_sky.glsl"
 #include "physics/received.glsl"
+#include "physics/correction.glsl"
 #include "physics/indirect.glsl"
 #include "forest/wind.glsl"
 #include "frame/trees/zfield_space.glsl"
@@ -26,13 +27,13 @@ layout(binding = 4) uniform usamplerBuffer cards;
 layout(binding = 5) uniform sampler2DArray surfaces;  // a species a layer: share of leaves, depth before the card
 layout(binding = 6) uniform sampler2DArray transfers; // five layers a species
 layout(binding = 8) uniform sampler2DArray forest_sky; // zonal harmonics of what a forest leaves of the sky, by height and thickness
-layout(std140, binding = 12) uniform Optics { vec4 items[3u * MAX_SPECIES]; } optics; // of each species: reflectance and transmittance of leaves, bark
 layout(binding = 15) uniform usamplerBuffer handed_light;
 layout(push_constant) uniform Push { CardLightParameters p; };
 layout(constant_id = 1) const bool HAS_SUN = true;
 layout(constant_id = 4) const bool INDIRECT = false;
 
 #include "frame/trees/near_sun.glsl"
+#include "frame/trees/seen_sun.glsl"
 
 const uint TRANSFER_LAYERS = 5u; // of four coefficients each: nine of what the seen side receives, then nine of the other
 
@@ -76,24 +77,27 @@ Shown shade(uint what, vec3 world) {
     float around = hole.x / max(kind.hole, 1e-9) * kind.mean_area, above = (found.z + kind.centre) * t.scale;
     vec3 zonal = textureLod(forest_sky, vec3(sky_place(above * p.top.y, around), 0.0), 0.0).xyz;
     mat3 back = tree_rotation(t);
-    Received light = card_received(texel, row, back * v.sun_direction, zonal);
+    vec3 sun = back * v.sun_direction;
+    Received light = card_received(texel, row, sun, zonal);
     // A leaf that the card shows from one side shows the other to who looks at the card askew.
     vec3 n = painted_normal(surface.zw);
     n = normalize(c.right) * n.x + normalize(c.up) * n.y + out_of * n.z;
     if (share > 0.5 && dot(n, resting(t, -world)) < 0.0) light = Received(light.sun.yx, light.sky.yx);
-    vec3 reflectance = mix(optics.items[3u * row + 2u].rgb, optics.items[3u * row].rgb, share) / PI;
-    vec3 transmittance = share * optics.items[3u * row + 1u].rgb / PI;
+    vec3 bark = (1.0 - share) * optics.items[OPTICS * row + 2u].rgb / PI, reflectance = share * optics.items[OPTICS * row].rgb / PI;
+    vec3 transmittance = share * optics.items[OPTICS * row + 1u].rgb / PI;
     HandedLight handed = nothing_handed();
     if (INDIRECT) handed = fetch_handed(handed_light, index);
     vec3 tint = vec3(tint_of(t));
-    vec3 sky_part = own.x * (reflectance * light.sky.x + transmittance * light.sky.y) * tint * v.sky_radiance + t.mean_sky;
+    vec3 sky_part = own.x * ((reflectance + bark) * light.sky.x + transmittance * light.sky.y) * tint * v.sky_radiance + t.mean_sky;
     vec3 sun_part = t.mean_sun;
     float lit_part = 0.0;
     if (HAS_SUN) {
         // The own tree's shadow is in the transfer.
         float visible = sun_left(t, kind, world, v.sun_direction, 1.0, false);
         lit_part = min(own.x * visible + lit.x, 1.0);
-        sun_part += (own.x * visible) * tint * (reflectance * light.sun.x + transmittance * light.sun.y) * v.sun_irradiance;
+        vec3 over = seen_sun(row, far_form ? 1u : 0u, back * normalize(-world), sun, height);
+        vec3 sun_seen = (over.x * reflectance + over.z * bark) * light.sun.x + (over.y * transmittance) * light.sun.y;
+        sun_part += (own.x * visible) * tint * sun_seen * v.sun_irradiance;
     }
     if (INDIRECT) {
         vec3 of_leaves = mix(kind.bark_ratio, vec3(1.0), share);

@@ -7,6 +7,7 @@
 #include "physics/harmonics.glsl"
 #include "physics/forest_sky.glsl"
 #include "physics/received.glsl"
+#include "physics/correction.glsl"
 #include "physics/indirect.glsl"
 #include "forest/wind.glsl"
 #include "frame/trees/zfield_space.glsl"
@@ -28,7 +29,6 @@ layout(binding = 5) uniform usamplerBuffer corners;
 layout(binding = 6) uniform usamplerBuffer faces;
 layout(binding = 8) uniform usamplerBuffer envelopes;
 layout(std140, binding = 9) uniform Leaves { vec4 items[2u * 26u]; } rule;
-layout(std140, binding = 12) uniform Optics { vec4 items[3u * MAX_SPECIES]; } optics; // of each species: reflectance and transmittance of leaves, bark
 layout(binding = 15) uniform usamplerBuffer handed_light;
 layout(binding = 14) uniform samplerBuffer hiding;    // of each direction, HIDING_STEPS pairs
 layout(push_constant) uniform Push { MeshLightParameters p; };
@@ -40,6 +40,7 @@ layout(constant_id = 6) const bool HARMONICS = false;
 layout(binding = 16) uniform sampler2DArray forest_sky; // zonal harmonics of what a forest leaves of the sky, by height and thickness
 
 #include "frame/trees/near_sun.glsl"
+#include "frame/trees/seen_sun.glsl"
 
 // What the crown leaves of sky and sun at a triangle of unit normal n, all in the tree's own axes; and of the sky, what the trees around leave
 // of thickness `around`, at a height above the ground in metres (src/bake/hiding.rs).
@@ -103,7 +104,7 @@ Shown shade(uint what, vec3 world) {
     bool front = !leaf || dot(n, viewer) >= 0.0;
     // Bark has one side, that which is seen.
     if (!leaf && dot(n, viewer) < 0.0) n = -n;
-    vec3 reflectance = optics.items[3u * row + (leaf ? 0u : 2u)].rgb, transmittance = leaf ? optics.items[3u * row + 1u].rgb : vec3(0.0);
+    vec3 reflectance = optics.items[OPTICS * row + (leaf ? 0u : 2u)].rgb, transmittance = leaf ? optics.items[OPTICS * row + 1u].rgb : vec3(0.0);
     vec2 hole = unpackHalf2x16(t.hole_change), own = unpackHalf2x16(t.own_lit), lit = unpackHalf2x16(t.mean_lit_change);
     float above_middle = (back * (world - t.centre)).z, height = above_middle / (kind.scale_to_metres.z * t.scale);
     HandedLight handed = nothing_handed();
@@ -115,7 +116,8 @@ Shown shade(uint what, vec3 world) {
         vec3 zonal = textureLod(forest_sky, vec3(sky_place(above / p.heights.x, around), 0.0), 0.0).xyz;
         Received light = face_received(face, front, sun, zonal);
         sky_seen = (reflectance * light.sky.x + transmittance * light.sky.y) / PI;
-        sun_seen = (reflectance * light.sun.x + transmittance * light.sun.y) / PI;
+        vec3 over = seen_sun(row, 0u, viewer, sun, height);
+        sun_seen = (reflectance * ((leaf ? over.x : over.z) * light.sun.x) + transmittance * (over.y * light.sun.y)) / PI;
     } else {
         LeafLight light = leaf_light(face, n, viewer, sun, above, around);
         sky_seen = leaf_sky(reflectance, transmittance, n, viewer, light.sky);
