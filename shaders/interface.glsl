@@ -83,7 +83,7 @@ struct View {
     float hotspot_amplitude;          // a1 of BN12 eq. 8
     float hotspot_width;              // a2 of BN12 eq. 8, 1/rad
     float ground_contrast;            // a3 of BN12 eq. 10
-    float convergence;                // distance over the range from which light is the average, BN12 eq. 22-25; 0: it never is
+    float convergence;                // distance over the range from which light is the average, BN12 eq. 22-25; less than 0: that of the ground alone; 0: it never is
     float silhouette_ratio;           // range of trees on silhouettes over that of others: 1 without relief
     float silhouette_step;            // first distance from a tree at which its sight line is compared with the ground, m
     float height_cell;                // metres a texel of the height map
@@ -317,6 +317,7 @@ struct CardParameters {
 struct ShellTable {
     vec4 shares[3];                   // of what channels of coverage tiles are: the share of the full density of trees, a unit
     vec4 nearness[3];                 // and 1 over the range of single trees of that species, 1/m; 0 where none is drawn by itself
+    vec4 sun[10];                     // what texels leave out of the sun on the side that is seen, and on the other one: src/bake/shells/sun.rs
     vec3 reflectance;                 // largest, that texels of 1 have
     float height;                     // of the stack, m
     vec3 transmittance;               // largest

@@ -24,5 +24,13 @@ vec2 correction_line(vec4 coefficients[4], CorrectionTerms y, float strength) {
                                             dot(coefficients[2], y.first) + dot(coefficients[3], y.second));
 }
 
+// K of the sun on slices of a forest at a share of the full density.
+float shell_correction(vec4 c[5], CorrectionTerms y, float share) {
+    float l = y.second.z, v = y.second.w;
+    vec2 more = vec2(l * l * l * l, v * v);
+    vec4 first = c[0] + share * c[3], second = c[1] + share * c[4];
+    return max(1.0 + dot(first, y.first) + dot(second, y.second) + dot(c[2], vec4(more, share * more)), 0.0);
+}
+
 // K at a height.
 float correction_at(vec2 line, float z) { return max(line.x + line.y * z, 0.0); }

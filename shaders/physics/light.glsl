@@ -37,6 +37,14 @@ vec3 leaf_phase(vec3 v, vec3 l, vec3 r, vec3 t) {
     return max(gamma, vec3(0.0)) * (2.0 / PI);
 }
 
+// Of leaves of uniform orientation whose sides a viewer sees, weighed by what he sees of them, at a phase angle: the mean irradiance of either side, over
+// that of all leaves; and the share of it that is on the side that is seen. Means of |n v| |n l| over the sphere where both are of one
+// sign and where they are not: (sin a + (pi - a) cos a) and (sin a - a cos a), to the same factor (Ross 1981).
+vec2 side_seen(float a) {
+    float s = sin(a), c = cos(a), same = s + (PI - a) * c, both = same + s - a * c;
+    return vec2(both * (4.0 / (3.0 * PI)), same / both);
+}
+
 // Sky seen from depth d on the axis of a cylindrical hole (BN12, eq. 9): 1 / (1 + d2 / r2), with 1 / r2 given.
 float hole_occlusion(float d, float inverse_r2) { return 1.0 / (1.0 + d * d * inverse_r2); }
 

@@ -33,10 +33,16 @@ impl Law {
 }
 
 /// Sums of a correction's least squares, min Σ w (K law − truth)²/law: weighed as counts are, whose variance is their mean.
-#[derive(Clone, Copy, Default)]
-pub struct Fit {
-    h: [[f64; 2 * TERMS]; 2 * TERMS],
-    y: [f64; 2 * TERMS],
+#[derive(Clone, Copy)]
+pub struct Fit<const N: usize = { 2 * TERMS }> {
+    h: [[f64; N]; N],
+    y: [f64; N],
+}
+
+impl<const N: usize> Default for Fit<N> {
+    fn default() -> Self {
+        Fit { h: [[0.0; N]; N], y: [0.0; N] }
+    }
 }
 
 impl Fit {
@@ -47,8 +53,19 @@ impl Fit {
         (strength, height, weight): (f64, f64, f64),
         (law, truth): (f64, f64),
     ) {
-        let x: [f64; 2 * TERMS] =
-            std::array::from_fn(|i| strength * terms[i % TERMS] * if i < TERMS { 1.0 } else { height });
+        let x = std::array::from_fn(|i| strength * terms[i % TERMS] * if i < TERMS { 1.0 } else { height });
+        self.add_row(&x, weight, (law, truth));
+    }
+
+    /// The coefficients; none where there is nothing to fit to.
+    pub fn solve(self) -> Correction {
+        Correction::from_coefficients(self.coefficients())
+    }
+}
+
+impl<const N: usize> Fit<N> {
+    /// Adds a sample whose coefficients belong to these terms.
+    pub fn add_row(&mut self, x: &[f64; N], weight: f64, (law, truth): (f64, f64)) {
         for (i, xi) in x.iter().enumerate() {
             // The derivative of (law (1 + x c) − truth)²/law.
             self.y[i] += weight * xi * (truth - law);
@@ -59,18 +76,17 @@ impl Fit {
     }
 
     /// Adds what another has summed up.
-    pub fn merge(&mut self, other: &Fit) {
+    pub fn merge(&mut self, other: &Self) {
         self.y.iter_mut().zip(other.y).for_each(|(a, b)| *a += b);
         self.h.iter_mut().flatten().zip(other.h.iter().flatten()).for_each(|(a, b)| *a += b);
     }
 
     /// The coefficients; none where there is nothing to fit to.
-    pub fn solve(mut self) -> Correction {
+    pub fn coefficients(mut self) -> [f32; N] {
         // Worth a hundred-thousandth of the samples: only what they cannot tell stays 0.
         let ridge = 1e-5 * self.h[0][0];
-        (0..2 * TERMS).for_each(|i| self.h[i][i] += ridge);
-        let x = least_squares::solve(self.h, self.y, 2 * TERMS).unwrap_or([0.0; 2 * TERMS]);
-        Correction::from_coefficients(x.map(|x| x as f32))
+        (0..N).for_each(|i| self.h[i][i] += ridge);
+        least_squares::solve(self.h, self.y, N).unwrap_or([0.0; N]).map(|x| x as f32)
     }
 }
 

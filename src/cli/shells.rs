@@ -152,11 +152,13 @@ fn verified(v: &Verified) -> String {
          from above, by distance from the edges of tiles:\n{}\
          by texels and slices (on the long way) at half density; all of it with --json:\n{}\
          light of a sun and of the sky on what slices show, by rays, and how much more the bytes tell (rms):\n{}\
+         the sun that is sent to viewers, by phase angle: by rays, over that by the bytes, with corrections and without:\n{}\
          cover from above along edges and inside, and steps from texel to texel:\n{}",
         angles.text(),
         edges.text(),
         coarse(v),
         light(v),
+        sun(v),
         seams.text()
     )
 }
@@ -170,6 +172,17 @@ fn light(v: &Verified) -> String {
         let told = |t: Told| format!("{:.3} {:+.3} ({:.3})", t.truth, t.difference, t.rms);
         let error = format!("{:.4}", l.both.error);
         table.row([light, side.into(), told(l.own), told(l.free), told(l.both), error]);
+    }
+    table.text()
+}
+
+/// The sun that is sent to viewers: a row a density and range of phase angles.
+fn sun(v: &Verified) -> String {
+    let mut table = Table::new(0, &["density", "phase", "trees", "shells", "uncorrected"]);
+    for s in &v.sun {
+        let phase = format!("{:.0}° to {:.0}°", s.from, s.to);
+        let [truth, corrected, plain] = [s.truth, s.corrected, s.plain].map(|v| format!("{v:.4}"));
+        table.row([format!("{}", s.share), phase, truth, corrected, plain]);
     }
     table.text()
 }

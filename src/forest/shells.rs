@@ -115,6 +115,9 @@ fn content(scene: &Scene, baked: &[Baked], shells: &Shells) -> ShellTable {
     let [reflectance, transmittance] = shells.most;
     ShellTable {
         shares,
+        sun: std::array::from_fn(|i| {
+            std::array::from_fn(|j| shells.sun[i / 5].coefficients[4 * (i % 5) + j])
+        }),
         reflectance,
         transmittance,
         height: shells.height,

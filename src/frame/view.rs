@@ -5,7 +5,7 @@ use super::shadows::Shadows;
 use crate::camera::{Cascade, Eye, Light};
 use crate::forest::cull::bin_end;
 use crate::forest::seeds::SeedData;
-use crate::gpu::interface::{DISTANCE_BINS, View};
+use crate::gpu::interface::{DISTANCE_BINS, HANDOVER_FROM, View};
 use crate::physics::wind::Motion;
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -82,7 +82,8 @@ pub fn view(
     view.hotspot_amplitude = s.hotspot_amplitude;
     view.hotspot_width = s.hotspot_width;
     view.ground_contrast = s.ground_contrast;
-    view.convergence = plan.convergence as f32;
+    // Under slices there are no shadows of single trees, but slices themselves are no average.
+    view.convergence = if plan.ladder.shells() { -HANDOVER_FROM } else { plan.convergence as f32 };
     view.silhouette_ratio = plan.silhouette_ratio as f32;
     view.silhouette_step = plan.tallest as f32;
     view.height_cell = scene.terrain.cell_size as f32;

@@ -42,6 +42,37 @@ pub fn phase_terms(view: f64, sun: f64, angle: f64) -> [f64; TERMS] {
     [hat(0.0), hat(1.0), hat(2.0), hat(3.0), hat(4.0), hat(5.0), sun.clamp(0.0, 1.0), view.clamp(0.0, 1.0)]
 }
 
+/// Terms of [`ShellCorrection`].
+pub const SHELL_TERMS: usize = 20;
+
+/// Coefficients for the sun on slices of a forest (`src/bake/shells/sun.rs`), K = max(1 + Σ c_i x_i, 0); by default nothing is corrected.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ShellCorrection {
+    /// c.
+    pub coefficients: [f32; SHELL_TERMS],
+}
+
+impl ShellCorrection {
+    /// x: (1, s) times [`phase_terms`], l_z⁴ and v_z², at a share s of the full density. What slices show is seen from straight above, and so is lit
+    /// by a high sun where means say it is not: that is no line in l_z.
+    pub fn terms(view: f64, sun: f64, angle: f64, share: f64) -> [f64; SHELL_TERMS] {
+        let y = phase_terms(view, sun, angle);
+        let more = [y[6].powi(4), y[7] * y[7]];
+        std::array::from_fn(|i| match i {
+            0..8 => y[i],
+            8..10 => more[i - 8],
+            10..12 => share * more[i - 10],
+            _ => share * y[i - 12],
+        })
+    }
+
+    /// K.
+    pub fn at(&self, terms: &[f64; SHELL_TERMS]) -> f64 {
+        let sum: f64 = self.coefficients.iter().zip(terms).map(|(c, x)| f64::from(*c) * x).sum();
+        (1.0 + sum).max(0.0)
+    }
+}
+
 impl Correction {
     /// Of all coefficients, a before b: what is stored, sent to shaders and solved for.
     pub fn from_coefficients(all: [f32; 2 * TERMS]) -> Self {
@@ -85,6 +116,14 @@ mod tests {
             assert!((y[..6].iter().sum::<f64>() - 1.0).abs() < 1e-12 && y[6..] == [0.5, 0.25]);
             assert!(y[..6].iter().filter(|h| **h > 0.0).count() <= 2);
         }
+        // Slices: terms for all of the density begin with those for none, but for two.
+        let x = ShellCorrection::terms(0.5, 0.25, 1.0, 0.5);
+        assert!(x[..8] == phase_terms(0.5, 0.25, 1.0) && x[8..12] == [0.00390625, 0.25, 0.001953125, 0.125]);
+        assert!((0..8).all(|i| x[12 + i] == 0.5 * x[i]));
+        let mut k = ShellCorrection::default();
+        assert_eq!(k.at(&x), 1.0);
+        k.coefficients[10] = -1000.0;
+        assert_eq!(k.at(&x), 0.0);
         // From under the ground nothing is known that the horizon does not know.
         assert_eq!(terms(-0.5, 2.0, 1.0), terms(0.0, 1.0, 1.0));
     }

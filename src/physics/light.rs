@@ -53,6 +53,18 @@ pub fn leaf_phase(angle: f64, r: f64, t: f64) -> f64 {
     gamma.max(0.0) * 2.0 / PI
 }
 
+/// Of leaves of uniform orientation whose sides a viewer sees, weighed by what he sees of them, at a phase angle, rad: the mean irradiance of either
+/// side, over that of all leaves; and the share of it that is on the side that is seen.
+///
+/// Means of |n·v| |n·l| over the sphere where both are of one sign and where they are not: sin α + (π − α) cos α and sin α − α cos α, to the
+/// same factor (Ross 1981).
+pub fn side_seen(angle: f64) -> [f64; 2] {
+    let (s, c) = angle.sin_cos();
+    let same = s + (PI - angle) * c;
+    let both = same + s - angle * c;
+    [both * 4.0 / (3.0 * PI), same / both]
+}
+
 /// Sky seen from depth d on the axis of a cylindrical hole of radius r (BN12, eq. 9), `inverse_r2` = 1/r².
 pub fn hole_occlusion(d: f64, inverse_r2: f64) -> f64 {
     1.0 / (1.0 + d * d * inverse_r2)
@@ -137,6 +149,24 @@ mod tests {
     fn leaf_phase_at_backscatter_is_that_of_lambertian_leaves() {
         // Visible leaves weigh cos, lit ones cos: r/π <cos²>/<cos> = 2r/(3π).
         assert!((leaf_phase(0.0, 0.3, 0.2) - 2.0 * 0.3 / (3.0 * PI)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn sides_that_are_seen_are_lit_as_uniform_leaves_are() {
+        let n = 400;
+        for angle in [0.0, 0.4, 1.3, PI / 2.0, 2.8, PI] {
+            // Normals over the sphere, the viewer at the pole: weights of what is seen, |n·v|, and of light on the same side and on either.
+            let (mut seen, mut same, mut both) = (0.0, 0.0, 0.0);
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                let (z, turn) =
+                    ((f64::from(i) + 0.5) / f64::from(n), 2.0 * PI * (f64::from(j) + 0.5) / f64::from(n));
+                let lit = (1.0 - z * z).sqrt() * turn.cos() * angle.sin() + z * angle.cos();
+                (seen, same, both) = (seen + z, same + z * lit.max(0.0), both + z * lit.abs());
+            }
+            let [mean, share] = side_seen(angle);
+            // The mean of |n·l| over all leaves is 1/2.
+            assert!((mean - 2.0 * both / seen).abs() < 1e-4 && (share - same / both).abs() < 1e-4, "{angle}");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::{Plan, meshes};
 use crate::camera::Eye;
-use crate::gpu::interface::{HANDOVER_FROM, MESH_TREES};
+use crate::gpu::interface::MESH_TREES;
 use crate::scene::Scene;
 
 impl Plan {
@@ -31,12 +31,9 @@ impl Plan {
             self.range = self.range.max(range);
         }
         self.last_mesh_range *= self.fit_meshes(scene);
-        if self.ladder.goes_on() {
+        // Slices are no average: trees before them keep light of their own.
+        if self.ladder.averages() {
             self.convergence = f64::from(s.convergence);
-        }
-        // Slices are no average: trees before them keep light of their own until they hand over (BN12, section 7).
-        if self.ladder.shells() {
-            self.convergence = self.convergence.max(f64::from(HANDOVER_FROM));
         }
         // The box of a tree is no wider than twice its reach. Filtered search is worth its price up to sqrt 2 texels a
         // pixel; and views 10 degrees apart differ by less than a pixel under about eleven pixels: sin 10 degrees of
@@ -90,6 +87,8 @@ impl Plan {
                 0.0
             }
             0.0 if self.forest && self.convergence > 0.0 => (self.convergence * self.range).min(seen),
+            // What stands for them beyond knows of its shadows.
+            0.0 if self.forest && self.ladder.goes_on() => self.range.min(seen),
             0.0 if self.forest => seen,
             0.0 => diagonal,
             chosen => chosen,

@@ -83,7 +83,7 @@ ForestNode shader_map(vec3 v, vec3 n, float distance, float thickness[MAX_SPECIE
         f.over += part;
         f.middle += path * depth.x;
         f.half_depth += path * depth.y;
-        f.converged += path * converged(relative, view.v.convergence);
+        f.converged += path * converged(relative, abs(view.v.convergence));
         f.seen_coverage += share * t.coverage;
         // As many trees as stand on a metre of the slope.
         float grown = x / min(known.discs, s.max_thickness), steep = x * n.z / min(known.sky * n.z, s.max_thickness);

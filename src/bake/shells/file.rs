@@ -2,17 +2,20 @@
 
 use std::path::Path;
 
-use super::{FREE_RAYS, LIGHT_IMAGES, LIGHT_TEXELS, LightMip, ShellSettings, Shells, empty, slices};
+use super::{
+    FREE_RAYS, LIGHT_IMAGES, LIGHT_TEXELS, LightMip, SUN_RAYS, ShellSettings, Shells, empty, slices,
+};
 use crate::Result;
 use crate::bake::CacheState;
 use crate::bake::file::{Fields, Format, load_or_build};
 use crate::bake::harmonics;
 use crate::land::pattern::TILES;
+use crate::physics::correction::{SHELL_TERMS, ShellCorrection};
 use crate::scene::{Distribution, Scene};
 
-const FORMAT: Format = Format { magic: *b"CANOPYSH", version: 2, extension: "shells" };
-/// Bytes of the head: side of a tile, height, largest reflectance and transmittance.
-const HEAD: usize = 8 + 4 + 4 * 6;
+const FORMAT: Format = Format { magic: *b"CANOPYSH", version: 6, extension: "shells" };
+/// Bytes of the head: side of a tile, height, largest reflectance and transmittance, corrections.
+const HEAD: usize = 8 + 4 + 4 * 6 + 4 * 2 * SHELL_TERMS;
 
 /// Shells from the cache if they are there, else made and put there.
 pub fn load(
@@ -59,6 +62,7 @@ fn key(scene: &Scene, settings: ShellSettings) -> [u8; 32] {
         slices::SHARES as u32,
         LIGHT_TEXELS,
         FREE_RAYS,
+        SUN_RAYS,
         scene.seed,
     ];
     fields.put(&numbers.map(u32::to_le_bytes).concat());
@@ -83,6 +87,7 @@ fn head(shells: &Shells) -> Vec<u8> {
     let mut head = shells.tile_side.to_le_bytes().to_vec();
     head.extend(shells.height.to_le_bytes());
     head.extend(shells.most.as_flattened().iter().flat_map(|v| v.to_le_bytes()));
+    head.extend(shells.sun.iter().flat_map(|k| k.coefficients).flat_map(f32::to_le_bytes));
     head
 }
 
@@ -95,6 +100,9 @@ fn decode(parts: Vec<Vec<u8>>, settings: ShellSettings) -> Shells {
         tile_side: f64::from_le_bytes(std::array::from_fn(|b| side[b])),
         height: number(0),
         most: [[number(1), number(2), number(3)], [number(4), number(5), number(6)]],
+        sun: [0, 1].map(|k| ShellCorrection {
+            coefficients: std::array::from_fn(|i| number(7 + SHELL_TERMS * k + i)),
+        }),
         levels: empty(settings),
         light: LightMip::empty(settings),
     };

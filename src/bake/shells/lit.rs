@@ -210,7 +210,7 @@ impl<'a> Trees<'a> {
 }
 
 /// Numbers of a texel of the finest light, which its cover's bytes are divided out of; `None` where they have none.
-fn numbers(shells: &Shells, texel: usize) -> Option<[f64; LIGHT]> {
+pub(super) fn numbers(shells: &Shells, texel: usize) -> Option<[f64; LIGHT]> {
     let (light, cover) = (&shells.light[0][0], &shells.levels[0][LIGHT_TEXELS.ilog2() as usize].cover);
     let cover = f64::from(cover[SHARES * texel + SHARES - 1]) / 255.0;
     let number = |k: usize| {

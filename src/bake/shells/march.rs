@@ -100,6 +100,14 @@ impl<'a> Stack<'a> {
         (0..self.slices).map(|slice| self.cover(slice, at(slice))).collect()
     }
 
+    /// Where a ray meets a level slice: the index of the texel, among those of a mip that is so many times coarser.
+    pub fn texel_at(&self, slice: u32, ground: DVec2, toward: DVec3, coarser: u32) -> usize {
+        let at = ground + toward.truncate() * (self.height_of(slice) / toward.z);
+        let n = self.texels / coarser as i32;
+        let place = (at * (f64::from(n) / self.side)).floor();
+        self.index(slice, n, [place.x as i32, place.y as i32])
+    }
+
     fn height_of(&self, slice: u32) -> f64 {
         (f64::from(slice) + 0.5) / f64::from(self.slices) * self.height
     }
@@ -159,11 +167,15 @@ impl<'a> Stack<'a> {
 
     /// A texel, counted east and north from the corner of tile 0, 0.
     fn texel(&self, slice: u32, x: i32, y: i32) -> [u8; SHARES] {
-        let n = self.texels;
+        let k = self.index(slice, self.texels, [x, y]);
+        std::array::from_fn(|c| self.cover[SHARES * k + c])
+    }
+
+    /// Index of a texel where a tile has n a side, counted east and north from the corner of tile 0, 0.
+    fn index(&self, slice: u32, n: i32, [x, y]: [i32; 2]) -> usize {
         let kind = tile_kind(self.seed, x.div_euclid(n), y.div_euclid(n)) as u32;
         let [column, row, n] = [x.rem_euclid(n), y.rem_euclid(n), n].map(|v| v as usize);
-        let k = ((kind * self.slices + slice) as usize * n + row) * n + column;
-        std::array::from_fn(|c| self.cover[SHARES * k + c])
+        ((kind * self.slices + slice) as usize * n + row) * n + column
     }
 }
 

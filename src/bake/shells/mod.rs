@@ -19,6 +19,7 @@ mod picture;
 mod pyramid;
 mod seams;
 mod slices;
+mod sun;
 mod verify;
 
 use std::path::Path;
@@ -36,6 +37,7 @@ pub use picture::picture;
 pub use pyramid::{Slices, Texel, VALUES};
 pub use seams::Seam;
 pub use slices::{Kind, SAMPLES, SHARES, Samples, Seen, Window};
+pub use sun::{SUN_RAYS, SunCorrections, SunTold};
 pub use verify::{Agreement, Quality, Verified, verify};
 
 use super::CacheState;
@@ -120,6 +122,8 @@ pub struct Shells {
     pub most: [[f32; 3]; 2],
     /// By level, from all slices to one, each with its mips from the finest to one texel a tile.
     pub levels: Vec<Vec<Mip>>,
+    /// What texels leave out of the sun on what is seen.
+    pub sun: SunCorrections,
     /// How light comes there, by level, each with its mips from the finest, [`LIGHT_TEXELS`] times as coarse as that of cover, to one texel a tile.
     pub light: Vec<Vec<LightMip>>,
 }
@@ -223,7 +227,9 @@ impl Shells {
     pub fn bake(scene: &Scene, settings: ShellSettings, dir: Option<&Path>, quiet: bool) -> Result<Self> {
         settings.check()?;
         let forest = Forest::new(scene)?;
-        Ok(Shells::of(&forest, &Lights::new(scene, &forest, dir, quiet)?, settings, quiet))
+        let mut shells = Shells::of(&forest, &Lights::new(scene, &forest, dir, quiet)?, settings, quiet);
+        shells.sun = sun::measure(scene, &forest, &shells)?;
+        Ok(shells)
     }
 
     /// Those of a forest.
@@ -244,6 +250,7 @@ impl Shells {
             tile_side: forest.patch.side,
             height: forest.height,
             most,
+            sun: SunCorrections::default(),
             levels: empty(settings),
             light: LightMip::empty(settings),
         };

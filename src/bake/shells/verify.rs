@@ -14,6 +14,7 @@ use super::lit::{Lit, lit};
 use super::march::{MARCHES, March, Stack};
 use super::seams::{Seam, seams};
 use super::slices::SHARES;
+use super::sun::{self, SunTold};
 use super::{Forest, Patch, Shells};
 use crate::Result;
 use crate::bake::foliage::Foliage;
@@ -29,6 +30,8 @@ pub(super) const BLOCK: i32 = 4;
 const LOWEST: f64 = 80.0;
 /// So many rays for the ground are asked for each texel whose light is looked at, by some ten thousand rays.
 const RAYS_A_TEXEL: u32 = 100;
+/// Seed of rays that corrections are held against: not that of those they were fitted to.
+const SUN_SEED: u32 = 1;
 /// Shares of the full density that are looked at.
 pub(super) const DENSITIES: [f64; 2] = [1.0, 0.5];
 
@@ -71,6 +74,8 @@ pub struct Verified {
     pub coarse: Vec<Coarse>,
     /// Light on what the finest slices show, at full density.
     pub light: Vec<Lit>,
+    /// The sun that shells send to viewers, by density and phase angle.
+    pub sun: Vec<SunTold>,
     /// Tiles side by side, at each share of the full density.
     pub seams: [Seam; SHARES],
 }
@@ -89,6 +94,7 @@ pub fn verify(scene: &Scene, shells: &Shells, directions: u32, points: u32) -> R
         angles: angles(scene, shells, &truth, (directions, points)),
         coarse: coarse(scene, shells, &truth, points),
         light: lit(scene, shells, &forest, points.div_ceil(RAYS_A_TEXEL))?,
+        sun: sun::check(scene, &forest, shells, SUN_SEED)?,
         edges: edges(scene, shells, &forest, 4 * points)?,
         seams: seams(shells),
     })
@@ -143,7 +149,7 @@ impl Truth {
 }
 
 /// The trees of a square of tiles that stand at a share of the full density, with the origin at the south-west corner of tile 0, 0.
-fn standing(patch: &Patch, seed: u32, tiles: Range<i32>, share: f64) -> Vec<Tree> {
+pub(super) fn standing(patch: &Patch, seed: u32, tiles: Range<i32>, share: f64) -> Vec<Tree> {
     let mut trees = Vec::new();
     for (x, y) in tiles.clone().flat_map(|y| tiles.clone().map(move |x| (x, y))) {
         let corner = Vec3::new(x as f32, y as f32, 0.0) * patch.side as f32;

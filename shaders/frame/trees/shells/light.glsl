@@ -5,6 +5,7 @@
 #include "physics/shadow.glsl"
 #include "physics/harmonics.glsl"
 #include "physics/received.glsl"
+#include "physics/correction.glsl"
 #include "physics/handover.glsl"
 #include "physics/indirect.glsl"
 #include "land/wang.glsl"
@@ -49,9 +50,9 @@ struct ShellLight {
     float open; // share of the sky that they leave
 };
 
-ShellLight shell_light(vec3 at, float level, float cover) {
-    vec4 c[7] = vec4[](textureLod(light_0, at, level), textureLod(light_1, at, level), textureLod(light_2, at, level), textureLod(light_3, at, level),
-                       textureLod(light_4, at, level), textureLod(light_5, at, level), textureLod(light_6, at, level));
+ShellLight shell_light(ShellTexel at, float level, float cover) {
+    vec4 c[7] = vec4[](shell_fetch(light_0, at, level), shell_fetch(light_1, at, level), shell_fetch(light_2, at, level), shell_fetch(light_3, at, level),
+                       shell_fetch(light_4, at, level), shell_fetch(light_5, at, level), shell_fetch(light_6, at, level));
     for (int k = 0; k < 7; k++) c[k] /= cover;
     ShellLight l;
     l.up = float[](c[0].x, c[0].y, c[0].z, c[0].w, c[1].x, c[1].y, c[1].z, c[1].w, c[2].x);
@@ -76,12 +77,16 @@ float direction_left(float free[9], vec3 l) {
     return clamp(left, 0.0, 1.0);
 }
 
-// Of leaves of uniform orientation whose sides v sees, weighed by what it sees of them: the mean irradiance from l on either side, over the mean of
-// all leaves on either side; and the share of it that is on the side that is seen. Cosines |n v| |n l| over the sphere, of the same sign and of
-// the other: (sin a + (pi - a) cos a)/2 and (sin a - a cos a)/2 (Ross 1981).
-vec2 side_seen(vec3 v, vec3 l) {
-    float a = angle_between(v, l), s = sin(a), c = cos(a), same = s + (PI - a) * c, both = same + s - a * c;
-    return vec2(both * (4.0 / (3.0 * PI)), same / both);
+// What texels leave out of the sun on the side that is seen, and on the other one, by the directions of viewer and sun and the share of
+// the density (src/bake/shells/sun.rs).
+vec2 seen_sun(float viewer, float sun, float angle, float share) {
+    CorrectionTerms y = phase_terms(viewer, sun, angle);
+    vec2 over;
+    for (int k = 0; k < 2; k++) {
+        vec4 c[5] = vec4[](table.t.sun[5 * k], table.t.sun[5 * k + 1], table.t.sun[5 * k + 2], table.t.sun[5 * k + 3], table.t.sun[5 * k + 4]);
+        over[k] = shell_correction(c, y, share);
+    }
+    return over;
 }
 
 // Sunlight on what hills leave to it: looked up as high as nothing stands, so that trees do not count twice.
@@ -108,13 +113,13 @@ Shown shade(uint what, vec3 world) {
     ShellPlace at = shell_place(world.xy - shell_sway(world.xy, height));
     // What a pixel spans of the slice: a square of the ray's distance, seen askew.
     float side = far / (v.pixels_at_1m * table.t.tile_side), level = max(shell_level(side * side * abs(n.z / max(abs(dot(n, toward)), 0.02))), 0.0);
-    uint layer = shell_layer(code, wang_tile(table.t.seed, at.tile));
-    vec3 texel = vec3(at.within, float(layer));
-    float cover = max(textureLod(covers, texel, level).w, 1.0 / 255.0);
-    vec4 reflected = textureLod(reflectances, texel, level) / cover, passed = textureLod(transmittances, texel, level) / cover;
+    ShellTexel texel = shell_texel(at, code, level);
+    float cover = max(shell_fetch(covers, texel, level).w, 1.0 / 255.0);
+    vec4 reflected = shell_fetch(reflectances, texel, level) / cover, passed = shell_fetch(transmittances, texel, level) / cover;
     // Light is premultiplied by the cover of texels as large as its own.
-    float light_level = max(level - p.larger, 0.0);
-    ShellLight light = shell_light(texel, light_level, max(textureLod(covers, texel, light_level + p.larger).w, 1.0 / 255.0));
+    float light_level = max(level - p.larger, 0.0), light_cover_level = light_level + p.larger;
+    ShellTexel light_texel = shell_texel(at, code, light_cover_level);
+    ShellLight light = shell_light(light_texel, light_level, max(shell_fetch(covers, light_texel, light_cover_level).w, 1.0 / 255.0));
     vec3 reflectance = min(reflected.rgb, 1.0) * table.t.reflectance / PI, transmittance = min(passed.rgb, 1.0) * table.t.transmittance / PI;
     vec4 channels[COVER_GROUPS];
     for (uint g = 0u; g < COVER_GROUPS; g++) channels[g] = vec4(0.0);
@@ -132,11 +137,12 @@ Shown shade(uint what, vec3 world) {
     vec3 sun_part = vec3(0.0);
     float lit = 0.0;
     if (HAS_SUN) {
-        vec2 seen = side_seen(toward, l), above = side_seen(vec3(0.0, 0.0, 1.0), l);
+        float angle = angle_between(toward, l);
+        vec2 seen = side_seen(angle), above = side_seen(angle_between(vec3(0.0, 0.0, 1.0), l)), over = seen_sun(toward.z, l.z, angle, share);
         // Seen from above it is the transfer; from elsewhere leaves show as much more of their light as uniform ones would.
         float both = (own.sun.x + own.sun.y) * seen.x / above.x;
         lit = pow(direction_left(light.free, l), share) * sun_facing(l, n) * hills_leave(world, height, far);
-        sun_part = (lit * both) * (reflectance * seen.y + transmittance * (1.0 - seen.y)) * v.sun_irradiance;
+        sun_part = (lit * both) * (reflectance * (over.x * seen.y) + transmittance * (over.y * (1.0 - seen.y))) * v.sun_irradiance;
     }
     if (INDIRECT) {
         IndirectAt node = indirect_at(thickness, texelFetch(indirect, 0).w, INDIRECT_NODES);

@@ -33,7 +33,7 @@ void main() {
     uint slices = shell_stack(detail_height.x, what.y), code = shell_part(what.y, slices);
     ShellPlace at = shell_place(position.xy - shell_sway(position.xy, detail_height.y));
     float level = shell_level(abs(x.x * y.y - x.y * y.x) / (table.t.tile_side * table.t.tile_side));
-    vec4 all = textureLod(covers, vec3(at.within, float(shell_layer(code, wang_tile(table.t.seed, at.tile)))), max(level, 0.0));
+    vec4 all = shell_fetch(covers, shell_texel(at, code, level), max(level, 0.0));
     // The mean over what a pixel spans of the ground, as the ground itself is looked up.
     vec2 dx = dFdx(cover_at.xy), dy = dFdy(cover_at.xy);
     float footprint = 0.5 * log2(max(max(dot(dx, dx), dot(dy, dy)), 1e-30)) + log2(float(COVER_SIDE)) + view.v.footprint;

@@ -55,6 +55,28 @@ ShellPlace shell_place(vec2 from_camera) {
     return ShellPlace(view.v.wang_camera + ivec2(tile), at - tile);
 }
 
+// Where a place is looked up in images of a slice. A filter there ends at the tile's edges, so within half a texel of one the tile beyond is looked up
+// as well, and the two are mixed as a filter over both would: in the middle of an edge just so, in a corner without the two tiles beyond it.
+struct ShellTexel {
+    vec3 at, beyond;
+    float part; // of what is beyond
+};
+
+// Of texels of a level of detail; `code` is the slice.
+ShellTexel shell_texel(ShellPlace place, uint code, float level) {
+    vec2 from_middle = place.within - 0.5, from_edge = 0.5 - abs(from_middle), side = mix(vec2(-1.0), vec2(1.0), greaterThan(from_middle, vec2(0.0)));
+    vec2 across = from_edge.x < from_edge.y ? vec2(side.x, 0.0) : vec2(0.0, side.y);
+    float part = 0.5 - min(from_edge.x, from_edge.y) * float(table.t.texels) * exp2(-max(level, 0.0));
+    ShellTexel t = ShellTexel(vec3(place.within, float(shell_layer(code, wang_tile(table.t.seed, place.tile)))), vec3(0.0), max(part, 0.0));
+    if (part > 0.0) t.beyond = vec3(place.within - across, float(shell_layer(code, wang_tile(table.t.seed, place.tile + ivec2(across)))));
+    return t;
+}
+
+vec4 shell_fetch(sampler2DArray image, ShellTexel t, float level) {
+    vec4 here = textureLod(image, t.at, level);
+    return t.part > 0.0 ? mix(here, textureLod(image, t.beyond, level), t.part) : here;
+}
+
 // Level of detail, of texels as large as a pixel is wide on the slice: `area` is what a pixel spans of it, in tile sides squared.
 float shell_level(float area) {
     return clamp(0.5 * log2(max(area, 1e-20)) + log2(float(table.t.texels)) + view.v.footprint, -8.0, log2(float(table.t.texels)));
