@@ -129,7 +129,8 @@ impl Plan {
 
     /// The same of clouds of cards.
     pub fn card_in_range(&self, extent: [f64; 2], ground: [f64; 2], place: [f64; 3]) -> bool {
-        self.trees_within_of(self.last_card_range, extent, ground, place)
+        // Where cards are the last rung before all trees together, their range is wider than that of single trees, and these end.
+        self.trees_within_of(self.last_card_range.min(self.last_range()), extent, ground, place)
     }
 
     /// Whether a tree of a range may be within it from a place.

@@ -213,6 +213,19 @@ fn what_a_chain_does_not_use_is_not_planned() {
 }
 
 #[test]
+fn a_plan_for_trees_beyond_all_cards_draws_them_together() {
+    let gpu = device::open();
+    let mut scene = oaks(&[]);
+    scene.species[0].distribution =
+        Distribution::Density { map: None, max_density: 0.005, between_heights: None, below_slope: None };
+    // Single trees end at 30 pixels, 60 m away, and the range of cards is twice as far.
+    let camera = device::camera([200.0, 200.0, 100.0], [200.0, 200.1, 0.0]);
+    let (report, l) = draw(&gpu, &scene, &camera, "cards:30,shader-map");
+    assert!(report.trees.camera == 0 && l.coverage.iter().sum::<f32>() > 100.0, "{}", report.trees.camera);
+    gpu.close().unwrap();
+}
+
+#[test]
 fn every_view_mode_and_one_sample_a_pixel_show_cards() {
     let gpu = device::open();
     let scene = oaks(&[[200.0, 200.0]]);

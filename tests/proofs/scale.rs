@@ -1,7 +1,8 @@
 //! The same radiance at every distance (BN12, figure 7), and its dependence on the view (figure 8).
 
 use canopy::ladder::Ladder;
-use canopy::measure::reflectance::{Method, Request, measure};
+use canopy::measure::reflectance::{Method, Request, measure, measure_reference};
+use canopy::reference::{Options, Until};
 
 use crate::{device, folder, luminance, oaks, plot};
 
@@ -68,6 +69,71 @@ fn radiance_does_not_depend_on_distance() {
     worst.iter().take(12).for_each(|w| println!("{:.3}  {}", w.0, w.1));
     // The aim is 0.05 everywhere; what is beyond is within a few degrees of v = l, see the README.
     assert!(within(0.05) >= 0.8 && worst[0].0 <= 0.15);
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn both_chains_over_distance() {
+    // A tree of 15 m is 256 pixels high at 54 m, 30 at 460 m, 12 at 1.2 km and 4 at 3.5 km: each chain's hand-overs are in here.
+    let distances = [40.0, 60.0, 200.0, 350.0, 500.0, 800.0, 1300.0, 2600.0, 3600.0, 5000.0, 20_000.0];
+    let chains = [
+        ("BN12", "mesh:256,zfield:4,shader-map"),
+        ("BCF05", "mesh:256,cards:30,shells"),
+        ("mixed", "mesh:256,zfield:12,shells"),
+    ];
+    let views = vec![[0.0, 0.0], [40.0, 0.0], [40.0, 180.0], [60.0, 0.0], [60.0, 180.0]];
+    let gpu = device::open();
+    let (scene, baked) = oaks(0.008, "");
+    let method = Method { patches: 4, pixels: 96, ..Method::default() };
+    let options = Options { until: Until::Samples(64), ..Options::default() };
+    let truth =
+        measure_reference(&scene, &[0.008], &method, [45.0, 0.0], &views, &options, &mut |_| ()).unwrap();
+    let mut series: Vec<(String, Vec<[f64; 2]>)> = Vec::new();
+    let mut csv = String::from("chain,distance,view,azimuth,ratio,error\n");
+    for (name, ladder) in chains {
+        let mut lines = vec![Vec::new(); 3];
+        for distance in distances {
+            let drawing = ladder.parse::<Ladder>().unwrap().into();
+            let request = Request { sun_zenith: 45.0, slope: 0.0, distance, drawing, views: views.clone() };
+            let camera = (&scene.cameras[0], SIZE);
+            let found =
+                measure(&gpu, &scene, &[0.008], &baked, camera, &method, &request, &mut || ()).unwrap();
+            let ratios: Vec<f64> = found
+                .iter()
+                .zip(&truth)
+                .map(|(m, t)| luminance(m.radiance()) / luminance(t.radiance()))
+                .collect();
+            for ((view, ratio), t) in views.iter().zip(&ratios).zip(&truth) {
+                let error = luminance(t.stderr) / luminance(t.radiance());
+                csv += &format!("{name},{distance},{},{},{ratio:.4},{error:.4}\n", view[0], view[1]);
+            }
+            let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+            println!("{name}, {distance} m: {mean:.3} of the truth; views {ratios:.3?}");
+            for (line, ratio) in lines.iter_mut().zip([mean, ratios[3], ratios[4]]) {
+                line.push([distance, ratio]);
+            }
+            // Any chain, anywhere: what docs/shells.md has, and room for its noise.
+            assert!(
+                (mean - 1.0).abs() < 0.2 && ratios.iter().all(|r| (r - 1.0).abs() < 0.35),
+                "{name}, {distance}"
+            );
+        }
+        let what = ["mean of five views", "60\u{b0}, sun behind", "60\u{b0}, sun before"];
+        let shown = if name == "mixed" { 1 } else { 3 };
+        series
+            .extend(what.iter().zip(lines).take(shown).map(|(what, line)| (format!("{name}, {what}"), line)));
+    }
+    gpu.close().unwrap();
+    std::fs::write(folder().join("chains_over_distance.csv"), csv).unwrap();
+    let title = "Radiance of oaks over path-traced truth, by the distance that they are drawn for";
+    plot::lines(
+        &folder().join("chains_over_distance.svg"),
+        title,
+        ("distance, m", "ratio"),
+        (0.7, 1.3),
+        true,
+        &series,
+    );
 }
 
 #[test]

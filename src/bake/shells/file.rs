@@ -13,7 +13,7 @@ use crate::land::pattern::TILES;
 use crate::physics::correction::{SHELL_TERMS, ShellCorrection};
 use crate::scene::{Distribution, Scene};
 
-const FORMAT: Format = Format { magic: *b"CANOPYSH", version: 6, extension: "shells" };
+const FORMAT: Format = Format { magic: *b"CANOPYSH", version: 7, extension: "shells" };
 /// Bytes of the head: side of a tile, height, largest reflectance and transmittance, corrections.
 const HEAD: usize = 8 + 4 + 4 * 6 + 4 * 2 * SHELL_TERMS;
 

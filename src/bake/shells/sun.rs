@@ -35,8 +35,10 @@ use crate::scene::Scene;
 /// K of what is sent back from the side that is seen, and of what comes through from the other.
 pub type SunCorrections = [ShellCorrection; 2];
 
-/// Rays of viewers for each share of the density: what shells send is then known to half a hundredth in each eighth of the phase angle.
+/// Rays of viewers for each share of the density, at most: what shells send is then known to a hundredth in each eighth of the phase angle.
 pub const SUN_RAYS: u32 = 65_536;
+/// At least.
+const FEWEST_RAYS: u32 = 8192;
 /// Of these a random stream; streams are the unit of work.
 const CHUNK: u32 = 512;
 /// Suns of a ray.
@@ -137,6 +139,9 @@ fn samples(scene: &Scene, forest: &Forest, shells: &Shells, seed: u32) -> Result
     // As far as the lowest ray goes below the tops, and from there a sun's.
     let reach = f64::from(shells.height) / LOWEST / shells.tile_side;
     let margin = (2.0 * reach).ceil() as i32;
+    // Coarse shells, whose texels are means of more, are worth fewer: one for four texels of a tile.
+    let texels = shells.settings.texels.pow(2) * shells.settings.slices;
+    let count = (texels / 4).clamp(FEWEST_RAYS, SUN_RAYS);
     let mut all = Vec::new();
     for share in shares() {
         let trees = standing(&forest.patch, scene.seed, -margin..BLOCK + margin, share);
@@ -151,7 +156,7 @@ fn samples(scene: &Scene, forest: &Forest, shells: &Shells, seed: u32) -> Result
             let mut open = rays::Stack::new();
             (0..CHUNK).flat_map(|_| rays.cast(&mut stream, &mut open)).collect::<Vec<_>>()
         };
-        all.par_extend((0..SUN_RAYS / CHUNK).into_par_iter().flat_map_iter(chunk));
+        all.par_extend((0..count / CHUNK).into_par_iter().flat_map_iter(chunk));
     }
     Ok(all)
 }
