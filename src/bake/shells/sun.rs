@@ -63,7 +63,7 @@ struct Sample {
     truth: [f64; 2],
 }
 
-/// What [`check`] finds of the sun that is sent to viewers at phase angles around one, all elevations together.
+/// What [`super::verify`] finds of the sun that is sent to viewers at phase angles around one, all elevations together.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct SunTold {
     /// Share of the full density.
