@@ -77,6 +77,10 @@ float direction_left(float free[9], vec3 l) {
     return clamp(left, 0.0, 1.0);
 }
 
+// A slope is level ground that is sheared along the vertical, and trees stand upright on both: what they hide from each other along a direction, they
+// hide on level ground along the direction that is sheared back. `w` points away from the ground of normal n.
+vec3 over_level(vec3 w, vec3 n) { return normalize(vec3(w.xy, max(dot(w, n), 0.0) / n.z)); }
+
 // What texels leave out of the sun on the side that is seen, and on the other one, by the directions of viewer and sun and the share of
 // the density (src/bake/shells/sun.rs).
 vec2 seen_sun(float viewer, float sun, float angle, float share) {
@@ -138,10 +142,11 @@ Shown shade(uint what, vec3 world) {
     float lit = 0.0;
     if (HAS_SUN) {
         float angle = angle_between(toward, l);
-        vec2 seen = side_seen(angle), above = side_seen(angle_between(vec3(0.0, 0.0, 1.0), l)), over = seen_sun(toward.z, l.z, angle, share);
+        vec3 level_sun = over_level(l, n);
+        vec2 seen = side_seen(angle), above = side_seen(angle_between(vec3(0.0, 0.0, 1.0), l)), over = seen_sun(over_level(toward, n).z, level_sun.z, angle, share);
         // Seen from above it is the transfer; from elsewhere leaves show as much more of their light as uniform ones would.
         float both = (own.sun.x + own.sun.y) * seen.x / above.x;
-        lit = pow(direction_left(light.free, l), share) * sun_facing(l, n) * hills_leave(world, height, far);
+        lit = pow(direction_left(light.free, level_sun), share) * sun_facing(l, n) * hills_leave(world, height, far);
         sun_part = (lit * both) * (reflectance * (over.x * seen.y) + transmittance * (over.y * (1.0 - seen.y))) * v.sun_irradiance;
     }
     if (INDIRECT) {
