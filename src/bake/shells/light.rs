@@ -92,7 +92,7 @@ pub fn range(number: usize) -> f64 {
 pub struct Lights {
     /// Of each face of each species the transfer to the side that faces up, and to the other.
     transfers: Vec<Vec<[Transfer; 2]>>,
-    foliage: Vec<Arc<Foliage>>,
+    pub(super) foliage: Vec<Arc<Foliage>>,
     fit: Fit,
 }
 

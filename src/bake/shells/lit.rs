@@ -220,14 +220,19 @@ pub(super) fn numbers(shells: &Shells, texel: usize) -> Option<[f64; LIGHT]> {
     (cover > 0.0).then(|| std::array::from_fn(number))
 }
 
+/// By a texel's numbers what of a sun gets past the own crown, on either side, and the share that other trees leave.
+pub(super) fn sun_past(numbers: &[f64; LIGHT], sun: DVec3) -> ([f64; 2], f64) {
+    let y = evaluate(sun.into());
+    let of = |k: usize| irradiance(&numbers[k * KEPT..(k + 1) * KEPT], &y);
+    ([of(0).max(0.0), of(1).max(0.0)], of(2).clamp(0.0, 1.0))
+}
+
 /// By a texel's numbers, as a renderer would.
 fn told(of: &mut [[Found; 2]; LIGHTS], numbers: &[f64; LIGHT], suns: &[DVec3]) {
-    let (sides, free) = (numbers.chunks_exact(KEPT), &numbers[2 * KEPT..3 * KEPT]);
-    for (side, own) in sides.take(2).enumerate() {
+    for (side, own) in numbers.chunks_exact(KEPT).take(2).enumerate() {
         for (k, sun) in suns.iter().enumerate() {
-            let y = evaluate((*sun).into());
-            let (own, free) = (irradiance(own, &y).max(0.0), irradiance(free, &y).clamp(0.0, 1.0));
-            of[k][side].told = [own, free, own * free];
+            let (own, free) = sun_past(numbers, *sun);
+            of[k][side].told = [own[side], free, own[side] * free];
         }
         let (own, free) = ((irradiance(own, &even_sky()) / PI).max(0.0), numbers[LIGHT - 1]);
         of[LIGHTS - 1][side].told = [own, free, own * free];

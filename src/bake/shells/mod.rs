@@ -227,8 +227,9 @@ impl Shells {
     pub fn bake(scene: &Scene, settings: ShellSettings, dir: Option<&Path>, quiet: bool) -> Result<Self> {
         settings.check()?;
         let forest = Forest::new(scene)?;
-        let mut shells = Shells::of(&forest, &Lights::new(scene, &forest, dir, quiet)?, settings, quiet);
-        shells.sun = sun::measure(scene, &forest, &shells)?;
+        let lights = Lights::new(scene, &forest, dir, quiet)?;
+        let mut shells = Shells::of(&forest, &lights, settings, quiet);
+        shells.sun = sun::measure(scene.seed, &forest, &lights.foliage, &shells);
         Ok(shells)
     }
 

@@ -12,25 +12,24 @@
 //! the same for single trees).
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::light::{LIGHT_TEXELS, foliage};
-use super::lit::numbers;
+use super::light::LIGHT_TEXELS;
+use super::lit::{numbers, sun_past};
 use super::march::{March, Stack};
 use super::slices::SHARES;
 use super::verify::{BLOCK, standing};
 use super::{Forest, Shells};
-use crate::Result;
 use crate::bake::correction::Fit;
+use crate::bake::foliage::Foliage;
 use crate::bake::grove::Grove;
 use crate::physics::correction::{SHELL_TERMS, ShellCorrection};
-use crate::physics::harmonics::{KEPT, evaluate, irradiance};
 use crate::physics::hash::{Stream, hash2};
 use crate::physics::light::{angle_between, luminance, side_seen};
 use crate::rays;
-use crate::scene::Scene;
 
 /// K of what is sent back from the side that is seen, and of what comes through from the other.
 pub type SunCorrections = [ShellCorrection; 2];
@@ -80,28 +79,27 @@ pub struct SunTold {
     pub corrected: f64,
 }
 
-/// Measures the shells of a scene; the same bits on any number of threads.
-///
-/// # Errors
-/// [`crate::Error::Usage`] for a model without extent.
-pub(super) fn measure(scene: &Scene, forest: &Forest, shells: &Shells) -> Result<SunCorrections> {
-    let samples = samples(scene, forest, shells, SEED)?;
-    Ok(std::array::from_fn(|part| {
+/// Measures the shells of the trees that have this foliage, tiled by this scene's seed; the same bits on any number of threads.
+pub(super) fn measure(
+    seed: u32,
+    forest: &Forest,
+    foliage: &[Arc<Foliage>],
+    shells: &Shells,
+) -> SunCorrections {
+    let samples = samples((seed, forest, foliage), shells, SEED);
+    std::array::from_fn(|part| {
         let mut fit = Fit::default();
         for s in samples.iter().filter(|s| s.said[part] > 0.0 || s.truth[part] > 0.0) {
             fit.add_row(&s.terms(), 1.0, (s.said[part], s.truth[part]));
         }
         ShellCorrection { coefficients: fit.coefficients() }
-    }))
+    })
 }
 
-/// Holds corrections against rays of another seed, in eighths of the phase angle.
-///
-/// # Errors
-/// As [`measure`].
-pub(super) fn check(scene: &Scene, forest: &Forest, shells: &Shells, seed: u32) -> Result<Vec<SunTold>> {
+/// Holds corrections against rays of another seed, in eighths of the phase angle; the trees as [`measure`] has them.
+pub(super) fn check(trees: (u32, &Forest, &[Arc<Foliage>]), shells: &Shells, seed: u32) -> Vec<SunTold> {
     const BINS: usize = 8;
-    let samples = samples(scene, forest, shells, seed)?;
+    let samples = samples(trees, shells, seed);
     let told = |(share, bin): (f64, usize)| {
         let edge = |k: usize| 180.0 * k as f64 / BINS as f64;
         let (from, to) = (edge(bin), edge(bin + 1));
@@ -120,7 +118,7 @@ pub(super) fn check(scene: &Scene, forest: &Forest, shells: &Shells, seed: u32) 
         let rays = mine.count().max(1) as f64;
         SunTold { share, from, to, truth: truth / rays, plain: plain / over, corrected: corrected / over }
     };
-    Ok(shares().flat_map(|share| (0..BINS).map(move |bin| (share, bin))).map(told).collect())
+    shares().flat_map(|share| (0..BINS).map(move |bin| (share, bin))).map(told).collect()
 }
 
 /// Those that are kept.
@@ -134,8 +132,11 @@ impl Sample {
     }
 }
 
-fn samples(scene: &Scene, forest: &Forest, shells: &Shells, seed: u32) -> Result<Vec<Sample>> {
-    let foliage = foliage(scene)?;
+fn samples(
+    (tiling, forest, foliage): (u32, &Forest, &[Arc<Foliage>]),
+    shells: &Shells,
+    seed: u32,
+) -> Vec<Sample> {
     // As far as the lowest ray goes below the tops, and from there a sun's.
     let reach = f64::from(shells.height) / LOWEST / shells.tile_side;
     let margin = (2.0 * reach).ceil() as i32;
@@ -144,11 +145,11 @@ fn samples(scene: &Scene, forest: &Forest, shells: &Shells, seed: u32) -> Result
     let count = (texels / 4).clamp(FEWEST_RAYS, SUN_RAYS);
     let mut all = Vec::new();
     for share in shares() {
-        let trees = standing(&forest.patch, scene.seed, -margin..BLOCK + margin, share);
+        let trees = standing(&forest.patch, tiling, -margin..BLOCK + margin, share);
         let rays = Rays {
             shells,
-            stack: Stack::new(shells, scene.seed, 0, 0),
-            grove: Grove::new(foliage.clone(), trees),
+            stack: Stack::new(shells, tiling, 0, 0),
+            grove: Grove::new(foliage.to_vec(), trees),
             share,
         };
         let chunk = |k: u32| {
@@ -158,7 +159,7 @@ fn samples(scene: &Scene, forest: &Forest, shells: &Shells, seed: u32) -> Result
         };
         all.par_extend((0..count / CHUNK).into_par_iter().flat_map_iter(chunk));
     }
-    Ok(all)
+    all
 }
 
 /// Trees and shells of a share of the full density.
@@ -235,11 +236,9 @@ impl Rays<'_> {
         let Some(numbers) = numbers(self.shells, light) else { return };
         let sent = self.sent(texel);
         for (sun, of) in suns {
-            let y = evaluate((*sun).into());
-            let own: f64 = [0, KEPT].map(|k| irradiance(&numbers[k..k + KEPT], &y).max(0.0)).iter().sum();
-            let free = irradiance(&numbers[2 * KEPT..3 * KEPT], &y).clamp(0.0, 1.0).powf(self.share);
+            let (own, free) = sun_past(&numbers, *sun);
             let ([seen, same], [above, _]) = (side_seen(of.angle), side_seen(sun.z.acos()));
-            let both = own * free * seen / above;
+            let both = (own[0] + own[1]) * free.powf(self.share) * seen / above;
             of.said = [sent[0] * same * both, sent[1] * (1.0 - same) * both];
         }
     }

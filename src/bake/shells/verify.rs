@@ -3,13 +3,13 @@
 
 use std::f64::consts::TAU;
 use std::ops::Range;
-use std::sync::Arc;
 
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 
 use super::coarse::{Coarse, coarse};
 use super::edges::{Near, edges};
+use super::light::foliage;
 use super::lit::{Lit, lit};
 use super::march::{MARCHES, March, Stack};
 use super::seams::{Seam, seams};
@@ -17,7 +17,6 @@ use super::slices::SHARES;
 use super::sun::{self, SunTold};
 use super::{Forest, Patch, Shells};
 use crate::Result;
-use crate::bake::foliage::Foliage;
 use crate::bake::grove::{Grove, Tree};
 use crate::land::candidate::tile_kind;
 use crate::physics::hash::{Stream, hash2};
@@ -94,7 +93,7 @@ pub fn verify(scene: &Scene, shells: &Shells, directions: u32, points: u32) -> R
         angles: angles(scene, shells, &truth, (directions, points)),
         coarse: coarse(scene, shells, &truth, points),
         light: lit(scene, shells, &forest, points.div_ceil(RAYS_A_TEXEL))?,
-        sun: sun::check(scene, &forest, shells, SUN_SEED)?,
+        sun: sun::check((scene.seed, &forest, &foliage(scene)?), shells, SUN_SEED),
         edges: edges(scene, shells, &forest, 4 * points)?,
         seams: seams(shells),
     })
@@ -134,8 +133,7 @@ pub(super) struct Truth {
 impl Truth {
     /// Of these tiles east and north, at two shares of the full density; their origin is the south-west corner of tile 0, 0.
     pub fn new(scene: &Scene, forest: &Forest, tiles: Range<i32>, shares: [f64; 2]) -> Result<Self> {
-        let foliage = scene.species.iter().map(|s| Foliage::new(&s.mesh, &s.optics).map(Arc::new));
-        let foliage = foliage.collect::<Result<Vec<_>>>()?;
+        let foliage = foliage(scene)?;
         let of =
             |share| Grove::new(foliage.clone(), standing(&forest.patch, scene.seed, tiles.clone(), share));
         Ok(Truth { groves: shares.map(of) })
